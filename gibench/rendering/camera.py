@@ -1,0 +1,110 @@
+"""The pinhole camera of a frame, and what it does to points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gibench.errors import GibenchError
+from gibench.rendering.backend import is_scalar
+
+
+class CameraError(GibenchError, ValueError):
+    """A camera that sees nothing, or a resolution that is none."""
+
+
+@dataclass(frozen=True)
+class PinholeCamera:
+    """A pinhole camera with Z up.
+
+    position, target: world space, metres, not equal. fov: horizontal field of view, radians, in (0, π).
+    """
+
+    position: tuple[float, float, float]
+    target: tuple[float, float, float]
+    fov: float
+
+    def __post_init__(self) -> None:
+        """Raises CameraError for what is no camera."""
+        finite = np.isfinite([*self.position, *self.target, self.fov]).all()
+        if not finite or not 0 < self.fov < np.pi or np.allclose(self.position, self.target, atol=1e-9):
+            raise CameraError(
+                f"camera at {self.position} towards {self.target} with a field of view of {self.fov} rad: position "
+                "and target must be finite and apart, the field of view between 0 and pi"
+            )
+
+    @property
+    def frame(self) -> NDArray[np.float64]:
+        """(3, 3): unit right, down and forward in world space, by row; what pixel x, pixel y and depth grow along.
+
+        A camera that looks exactly along Z has no horizon: its right is then world x.
+        """
+        forward = np.subtract(self.target, self.position).astype(np.float64)
+        forward /= np.linalg.norm(forward)
+        right = np.cross(forward, [0.0, 0.0, 1.0])
+        length = np.linalg.norm(right)
+        right = right / length if length > 1e-7 else np.array([1.0, 0.0, 0.0])
+        return np.array([right, np.cross(forward, right), forward])
+
+    def focal_length(self, width: int) -> float:
+        """In pixels."""
+        return 0.5 * width / float(np.tan(0.5 * self.fov))
+
+    def project(self, points: Any, resolution: tuple[int, int]) -> tuple[Any, Any, Any]:
+        """Pixel coordinates (x, y) and depth of world points.
+
+        points: a Mitsuba point array, or an (…, 3) NumPy array. The centre of the first pixel is (0.5, 0.5). Where
+        the depth is not positive, x and y mean nothing.
+        """
+        width, height = resolution
+        numpy = isinstance(points, np.ndarray)
+        axes, focal = self.frame, self.focal_length(width)
+        parts = np.moveaxis(points, -1, 0) if numpy else (points.x, points.y, points.z)
+        offset = [p - float(c) for p, c in zip(parts, self.position, strict=True)]
+        x, y, depth = (sum(float(a) * o for a, o in zip(axis, offset, strict=True)) for axis in axes)
+        return x / depth * focal + 0.5 * width, y / depth * focal + 0.5 * height, depth
+
+
+def check_resolution(resolution: tuple[int, int]) -> tuple[int, int]:
+    """(width, height) as integers in [1, 16384]. Raises CameraError."""
+    width, height = resolution
+    if not (1 <= int(width) == width <= 16384 and 1 <= int(height) == height <= 16384):
+        raise CameraError(
+            f"resolution {width}x{height}: width and height must be whole numbers from 1 to 16384"
+        )
+    return int(width), int(height)
+
+
+class RayGenerator:
+    """Rays of a camera, with its numbers kept out of the compiled kernel, so that one kernel serves all frames."""
+
+    def __init__(self, camera: PinholeCamera, resolution: tuple[int, int]) -> None:
+        """Under the current variant."""
+        import drjit as dr
+        import mitsuba as mi
+
+        width, height = check_resolution(resolution)
+        focal = camera.focal_length(width)
+        self._origin = mi.Point3f(list(camera.position))
+        self._axes = [mi.Vector3f(row.tolist()) for row in camera.frame]
+        self._scale = mi.Float(1 / focal)
+        self._centre = mi.Vector2f(0.5 * width, 0.5 * height)
+        if not is_scalar():
+            dr.make_opaque(self._origin, self._axes, self._scale, self._centre)
+
+    @property
+    def forward(self) -> Any:
+        """Unit vector along the optical axis."""
+        return self._axes[2]
+
+    def rays(self, pixel: Any) -> Any:
+        """Rays through film positions `pixel` (mi.Point2f, pixels; (0, 0) is the outer corner of the first pixel)."""
+        import drjit as dr
+        import mitsuba as mi
+
+        offset = (pixel - self._centre) * self._scale
+        right, down, forward = self._axes
+        return mi.Ray3f(self._origin, dr.normalize(offset.x * right + offset.y * down + forward))

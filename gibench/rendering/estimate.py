@@ -1,0 +1,292 @@
+"""Radiance of a frame from path samples: passes, sums, and the standard error of the result.
+
+Stratified samples of one pixel are not independent, so their own spread would overstate the error. They are
+therefore drawn in groups: each is a stratified set, the groups are independent of one another, and the spread of
+the group means is an unbiased measure of the error (random groups: Wolter, "Introduction to Variance Estimation",
+2007, chapter 2).
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gibench.errors import GibenchError
+from gibench.rendering.backend import is_scalar
+from gibench.rendering.camera import PinholeCamera, RayGenerator
+from gibench.rendering.channels import PARTS
+from gibench.rendering.scene import Scene
+
+LANES = 1 << 20
+"""Paths in flight at once: enough to fill a wide GPU, while memory stays the same for every spp and resolution."""
+
+MINIMUM_GROUPS = 16
+"""With 16 groups the standard error is itself known to 1/√30 = 18 %."""
+
+MAXIMUM_LEVELS = 3
+"""Groups of 64 at most, which is what one pass draws."""
+
+ROUND = 64
+"""Samples a pixel that are added at a time until a target error is met."""
+
+RELATIVE_FLOOR = 0.01
+"""Pixels darker than this share of the frame's mean luminance are left out of its median relative error."""
+
+GUIDES = ("albedo", "normal")
+
+
+class EstimateError(GibenchError, ValueError):
+    """A number of samples, a depth or an error target that cannot be rendered."""
+
+
+def group_levels(spp: int) -> int:
+    """Groups have 4^levels samples: the largest that divides `spp` and leaves MINIMUM_GROUPS groups.
+
+    64 → 1, 256 → 2, 1024 and more → MAXIMUM_LEVELS; 0 (independent samples) where nothing larger will do.
+    """
+    fits = (n for n in range(MAXIMUM_LEVELS, 0, -1) if spp % 4**n == 0 and spp // 4**n >= MINIMUM_GROUPS)
+    return next(fits, 0)
+
+
+@dataclass
+class Estimate:
+    """Running means over (H·W) pixels, in float64, from groups of 4^levels samples.
+
+    sums: part → (H·W, 3), summed over samples. mean and squares: (H·W, 3), mean of the group means of color and the
+    sum of their squared deviations. seconds: inside the renderer's kernels. invalid: paths that came back
+    with NaN or infinity and count as 0.
+    """
+
+    pixels: int
+    levels: int
+    sums: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    mean: NDArray[np.float64] = field(init=False)
+    squares: NDArray[np.float64] = field(init=False)
+    groups: int = 0
+    spp: int = 0
+    seconds: float = 0.0
+    invalid: int = 0
+
+    def __post_init__(self) -> None:
+        self.mean = np.zeros((self.pixels, 3))
+        self.squares = np.zeros((self.pixels, 3))
+
+    def part(self, name: str) -> NDArray[np.float64]:
+        """Mean of one part or guide, (H·W, 3)."""
+        return self.sums[name] / self.spp
+
+    @property
+    def standard_error(self) -> NDArray[np.float64]:
+        """Of the mean color, (H·W, 3). Needs two groups."""
+        if self.groups < 2:
+            raise EstimateError("color_se needs at least 2 samples a pixel: raise spp, or leave color_se out")
+        return np.sqrt(self.squares / (self.groups * (self.groups - 1)))
+
+    @property
+    def median_error(self) -> float:
+        """Median over pixels of the relative standard error of color (its components averaged).
+
+        Pixels with less than RELATIVE_FLOOR of the frame's mean are left out. 0 for a black frame.
+        """
+        color = self.mean.mean(axis=1)
+        bright = color > RELATIVE_FLOOR * color.mean()
+        if not bright.any():
+            return 0.0
+        return float(np.median(self.standard_error.mean(axis=1)[bright] / color[bright]))
+
+
+def _launch(
+    scene: Scene,
+    generator: RayGenerator,
+    width: int,
+    first_pixel: int,
+    pixels: int,
+    samples: int,
+    levels: int,
+    seed: int,
+    max_depth: int,
+    guides: bool,
+) -> tuple[dict[str, NDArray[np.float32]], NDArray[np.float32], int]:
+    """Means over `samples` paths for each of `pixels` pixels; the groups' shares of that of color; invalid paths."""
+    import drjit as dr
+    import mitsuba as mi
+
+    from gibench.rendering.integrator import trace_paths
+    from gibench.rendering.sampling import StratifiedSampler
+
+    lanes = pixels * samples
+    sampler = StratifiedSampler(seed, lanes, levels)
+    pixel = dr.arange(mi.UInt32, lanes) // dr.opaque(mi.UInt32, samples) + dr.opaque(mi.UInt32, first_pixel)
+    row = pixel // dr.opaque(mi.UInt32, width)
+    corner = mi.Point2f(mi.Float(pixel - row * dr.opaque(mi.UInt32, width)), mi.Float(row))
+    path = trace_paths(
+        scene.mi_scene,
+        sampler,
+        generator.rays(corner + sampler.next_2d()),
+        max_depth=max_depth,
+        guides=guides,
+    )
+
+    parts = {name: getattr(path, name) for name in PARTS}
+    color = sum(parts.values())
+    finite = dr.all(dr.isfinite(color))
+    # Divided before they are summed, so that huge radiance does not overflow on the way.
+    share = 1 / dr.opaque(mi.Float, samples)
+    parts = {name: dr.select(finite, value * share, 0) for name, value in parts.items()}
+    if guides:
+        parts |= {name: getattr(path, name) * share for name in GUIDES}
+    invalid = dr.select(finite, mi.UInt32(0), mi.UInt32(1))
+    # One kernel for all of it. A reduction of what is not evaluated yet would trace the paths once more.
+    dr.eval(parts, invalid)
+
+    color = sum(parts[name] for name in PARTS)
+    sums = {name: [dr.block_sum(c, samples) for c in value] for name, value in parts.items()}
+    groups = [dr.block_sum(c, 4**levels) for c in color]
+    count = dr.sum(invalid)
+    dr.eval(sums, groups, count)
+    return (
+        {name: np.stack([np.array(c) for c in value], axis=-1) for name, value in sums.items()},
+        np.stack([np.array(c) for c in groups], axis=-1).reshape(pixels, samples // 4**levels, 3),
+        int(count[0]),
+    )
+
+
+def _launch_scalar(
+    scene: Scene,
+    generator: RayGenerator,
+    width: int,
+    first_pixel: int,
+    pixels: int,
+    samples: int,
+    levels: int,
+    seed: int,
+    max_depth: int,
+    guides: bool,
+) -> tuple[dict[str, NDArray[np.float32]], NDArray[np.float32], int]:
+    """The same one path at a time, for machines on which Dr.Jit compiles nothing."""
+    import mitsuba as mi
+
+    from gibench.rendering.integrator import trace_paths
+    from gibench.rendering.sampling import IndependentSampler
+
+    sampler = IndependentSampler()
+    names = [*PARTS, *(GUIDES if guides else ())]
+    values = np.zeros((len(names), pixels, samples, 3), dtype=np.float32)
+    for p in range(pixels):
+        sampler.seed((seed * 0x9E3779B1 + first_pixel + p) % 2**32)
+        corner = mi.Point2f((first_pixel + p) % width, (first_pixel + p) // width)
+        for s in range(samples):
+            rays = generator.rays(corner + sampler.next_2d())
+            path = trace_paths(scene.mi_scene, sampler, rays, max_depth=max_depth, guides=guides)
+            values[:, p, s] = [np.array(getattr(path, name)) for name in names]
+    finite = np.isfinite(values).all(axis=(0, -1))
+    values[:, ~finite] = 0
+    values /= samples
+    color = values[: len(PARTS)].sum(axis=0)
+    groups = color.reshape(pixels, samples // 4**levels, 4**levels, 3).sum(axis=2)
+    return dict(zip(names, values.sum(axis=2), strict=True)), groups, int((~finite).sum())
+
+
+def _add(
+    estimate: Estimate,
+    scene: Scene,
+    camera: PinholeCamera,
+    resolution: tuple[int, int],
+    samples: int,
+    seed: np.random.SeedSequence,
+    max_depth: int,
+    guides: bool,
+) -> None:
+    """Adds `samples` paths to every pixel: a block of pixels after the other, so that LANES bounds the memory."""
+
+    launch = _launch_scalar if is_scalar() else _launch
+    generator = RayGenerator(camera, resolution)
+    block = max(LANES // samples, 1)
+    added = samples // 4**estimate.levels
+    total = estimate.groups + added
+    for first in range(0, estimate.pixels, block):
+        count = min(block, estimate.pixels - first)
+        where = slice(first, first + count)
+        number = int(
+            np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, first)).generate_state(1)[0]
+        )
+        start = time.perf_counter()
+        launched, groups, invalid = launch(
+            scene,
+            generator,
+            resolution[0],
+            first,
+            count,
+            samples,
+            estimate.levels,
+            number,
+            max_depth,
+            guides,
+        )
+        estimate.seconds += time.perf_counter() - start
+        estimate.invalid += invalid
+        for name, value in launched.items():
+            estimate.sums.setdefault(name, np.zeros((estimate.pixels, 3)))[where] += (
+                value.astype(np.float64) * samples
+            )
+
+        # Chan, Golub and LeVeque 1979: pairwise update of mean and squared deviations.
+        means = groups.astype(np.float64) * added
+        mean = means.mean(axis=1)
+        shift = mean - estimate.mean[where]
+        estimate.squares[where] += np.square(means - mean[:, None]).sum(axis=1)
+        estimate.squares[where] += np.square(shift) * (estimate.groups * added / total)
+        estimate.mean[where] += shift * (added / total)
+    estimate.groups = total
+    estimate.spp += samples
+
+
+def estimate_radiance(
+    scene: Scene,
+    camera: PinholeCamera,
+    resolution: tuple[int, int],
+    *,
+    spp: int | None = None,
+    error: float | None = None,
+    spp_cap: int = 4096,
+    seed: int = 0,
+    max_depth: int = 8,
+    guides: bool = False,
+) -> Estimate:
+    """Traces paths until `spp` samples a pixel are there, or until the median relative error is below `error`.
+
+    Give one of spp (≥ 1) and error (> 0; a multiple of ROUND samples, at most spp_cap). seed: any integer ≥ 0.
+    max_depth: scattering events, ≥ 0. guides: also sum first-hit albedo and normal, for the denoiser.
+    Raises EstimateError for numbers out of range.
+    """
+    if (spp is None) == (error is None):
+        raise EstimateError("give either spp or error")
+    if spp is not None and spp < 1:
+        raise EstimateError(f"spp is {spp}: at least 1 sample a pixel is needed")
+    if error is not None and not error > 0:
+        raise EstimateError(f"error is {error}: the target must be above 0 (0.02 is 2 %)")
+    if spp_cap < ROUND and error is not None:
+        raise EstimateError(f"the cap of {spp_cap} samples is below one round of {ROUND}")
+    if max_depth < 0:
+        raise EstimateError(f"max_depth is {max_depth}: it counts scattering events, from 0")
+
+    width, height = resolution
+    estimate = Estimate(width * height, group_levels(spp if spp is not None else ROUND))
+    goal = spp if spp is not None else spp_cap - spp_cap % ROUND
+    while estimate.spp < goal:
+        samples = min(ROUND, goal - estimate.spp)
+        lane_seed = np.random.SeedSequence(seed, spawn_key=(estimate.spp,))
+        _add(estimate, scene, camera, resolution, samples, lane_seed, max_depth, guides)
+        if error is not None and estimate.median_error < error:
+            break
+    return estimate
+
+
+def frame_of(values: NDArray[Any], resolution: tuple[int, int]) -> NDArray[np.float32]:
+    """(H·W, C) as a float32 image (H, W, C)."""
+    width, height = resolution
+    return values.reshape(height, width, -1).astype(np.float32)

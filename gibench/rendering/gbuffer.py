@@ -1,0 +1,201 @@
+"""Surface, reflection, curvature and motion channels, point-sampled at pixel centres in one kernel.
+
+Conventions as in `channels`. A miss holds 0 everywhere. Only what is asked for is computed.
+"""
+
+# mypy: disable-error-code="no-untyped-def, misc"
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from gibench.rendering import surface
+from gibench.rendering.backend import is_scalar
+from gibench.rendering.camera import PinholeCamera, RayGenerator
+from gibench.rendering.channels import CHANNELS, SETS
+from gibench.rendering.integrator import bsdf_at
+from gibench.rendering.scene import Scene
+
+VISIBILITY_TOLERANCE = 1e-3
+"""Relative difference of distance below which a point counts as the one that the earlier camera saw."""
+
+UMBILIC_TOLERANCE = 1e-4
+"""Relative difference of the principal curvatures below which they count as equal."""
+
+SURFACE_SETS = ("surface", "reflection", "curvature", "motion")
+
+
+class _Hit:
+    """The first hit of each pixel, with what several channels share."""
+
+    def __init__(self, scene: Scene, rays: Any, flags: Any) -> None:
+        self.scene = scene
+        self.rays = rays
+        self.si = scene.mi_scene.ray_intersect(rays, flags, True)
+        self.valid = self.si.is_valid()
+        self.bsdf = bsdf_at(self.si, rays)
+
+    def facing(self, normal: Any) -> Any:
+        """`normal`, turned towards where the ray came from; 0 on a miss."""
+        turned = dr.select(dr.dot(self.si.n, self.rays.d) > 0, -normal, normal)
+        return dr.select(self.valid, turned, 0)
+
+    @property
+    def normal(self) -> Any:
+        return self.facing(self.si.sh_frame.n)
+
+    def mirrored(self) -> _Hit:
+        """The hit of the mirror ray."""
+        si, d = self.si, self.rays.d
+        face = self.facing(si.n)
+        mirror = d - 2 * dr.dot(d, self.normal) * self.normal
+        # Interpolated normals can send it through the surface near a silhouette: there the face decides.
+        mirror = dr.select(dr.dot(mirror, face) > 0, mirror, d - 2 * dr.dot(d, face) * face)
+        rays = si.spawn_ray(dr.normalize(mirror))
+        rays.maxt = dr.select(self.valid, rays.maxt, 0)
+        return _Hit(self.scene, rays, mi.RayFlags.All)
+
+    def masked(self, value: Any) -> Any:
+        return dr.select(self.valid, value, 0)
+
+
+def _principal_curvatures(hit: _Hit) -> tuple[Any, Any, Any]:
+    """The two principal curvatures (1/m), larger size first, and the unit direction of the first.
+
+    From the derivatives of position and shading normal along u and v (Weingarten's equations): on a mesh these are
+    those of the interpolated normals, exact on Mitsuba's analytic shapes. Where u and v do not span the surface, 0.
+    """
+    si = hit.si
+    s = dr.normalize(si.dp_du)
+    s = dr.select(dr.isfinite(s.x) & (dr.squared_norm(si.dp_du) > 0), s, mi.coordinate_system(si.n)[0])
+    t = dr.cross(si.n, s)
+    a, b = dr.dot(si.dp_du, s), dr.dot(si.dp_dv, s)
+    c, d = dr.dot(si.dp_du, t), dr.dot(si.dp_dv, t)
+    determinant = a * d - b * c
+    scale = dr.squared_norm(si.dp_du) * dr.squared_norm(si.dp_dv)
+    usable = hit.valid & (dr.square(determinant) > 1e-10 * scale)
+    inverse = dr.select(usable, dr.rcp(determinant), 0)
+    u_s, u_t = d * inverse, -b * inverse
+    v_s, v_t = -c * inverse, a * inverse
+    along_s = si.dn_du * u_s + si.dn_dv * v_s
+    along_t = si.dn_du * u_t + si.dn_dv * v_t
+    # A surface that bends away from its normal spreads its normals: hence the sign.
+    xx, yy = -dr.dot(along_s, s), -dr.dot(along_t, t)
+    xy = -0.5 * (dr.dot(along_s, t) + dr.dot(along_t, s))
+    mean, half = 0.5 * (xx + yy), 0.5 * (xx - yy)
+    root = dr.sqrt(dr.square(half) + dr.square(xy))
+    first = dr.select(mean >= 0, mean + root, mean - root)
+    second = dr.select(mean >= 0, mean - root, mean + root)
+    angle = 0.5 * dr.atan2(xy, half) + dr.select(mean >= 0, 0, 0.5 * dr.pi)
+    direction = dr.cos(angle) * s + dr.sin(angle) * t
+    # On a sphere every direction is principal: take u rather than rounding noise.
+    direction = dr.select(root > UMBILIC_TOLERANCE * dr.abs(mean), direction, s)
+    flip = dr.select(dr.dot(si.n, hit.rays.d) > 0, -1, 1)
+    usable &= dr.isfinite(first) & dr.isfinite(second)
+    return (
+        dr.select(usable, first * flip, 0),
+        dr.select(usable, second * flip, 0),
+        dr.select(usable, direction, 0),
+    )
+
+
+def _motion(
+    hit: _Hit, pixel: Any, previous: PinholeCamera | None, resolution: tuple[int, int]
+) -> tuple[Any, Any]:
+    """Offset (pixels) to where the earlier camera saw the point, and whether it did see it there."""
+    if previous is None:
+        return mi.Vector2f(dr.zeros(mi.Float, dr.width(pixel))), dr.zeros(mi.Float, dr.width(pixel))
+    width, height = resolution
+    x, y, depth = previous.project(hit.si.p, resolution)
+    ahead = hit.valid & (depth > 0)
+    offset = dr.select(ahead, mi.Vector2f(x, y) - pixel, 0)
+    inside = ahead & (x >= 0) & (x < width) & (y >= 0) & (y < height)
+    origin = mi.Point3f(list(previous.position))
+    towards = hit.si.p - origin
+    distance = dr.norm(towards)
+    ray = mi.Ray3f(origin, towards / distance)
+    seen = hit.scene.mi_scene.ray_intersect_preliminary(ray, coherent=False, active=inside).t
+    visible = inside & (dr.abs(seen - distance) <= VISIBILITY_TOLERANCE * distance)
+    return offset, dr.select(visible, mi.Float(1), 0)
+
+
+def render_gbuffer(
+    scene: Scene,
+    camera: PinholeCamera,
+    resolution: tuple[int, int],
+    channels: Sequence[str],
+    *,
+    previous_camera: PinholeCamera | None = None,
+) -> dict[str, NDArray[Any]]:
+    """The surface-like channels of one frame.
+
+    resolution: (width, height). channels: names from the sets in SURFACE_SETS. previous_camera: of the frame before
+    it on a path; without one, motion is 0 and nowhere valid. Returns name → (H, W, C), float32 or uint32.
+    """
+    wanted = set(channels)
+    if not wanted:
+        return {}
+    width, height = resolution
+    scalar = is_scalar()
+    flags = mi.RayFlags.All
+    if wanted & set(SETS["curvature"]):
+        flags = flags | mi.RayFlags.dNSdUV
+    generator = RayGenerator(camera, resolution)
+
+    def values(pixel: Any) -> dict[str, list[Any]]:
+        hit = _Hit(scene, generator.rays(pixel), flags)
+        names: dict[str, Callable[[], Any]] = {
+            "position": lambda: hit.masked(hit.si.p),
+            "normal": lambda: hit.normal,
+            "geometric_normal": lambda: hit.facing(hit.si.n),
+            "depth": lambda: hit.masked(hit.si.t * dr.dot(hit.rays.d, generator.forward)),
+            "distance": lambda: hit.masked(hit.si.t),
+            "albedo": lambda: surface.albedo(hit.bsdf, hit.si, hit.valid),
+            "specular_albedo": lambda: surface.specular_albedo(hit.bsdf, hit.si, hit.valid),
+            "roughness": lambda: surface.roughness(hit.bsdf, hit.si, hit.valid),
+            "material_id": lambda: scene.material_ids(hit.bsdf, hit.valid),
+            "shape_id": lambda: scene.shape_ids(hit.si.shape, hit.valid),
+        }
+        if wanted & set(SETS["reflection"]):
+            mirror = hit.mirrored()
+            names |= {
+                "reflected_position": lambda: mirror.masked(mirror.si.p),
+                "reflected_normal": lambda: mirror.normal,
+                "reflected_albedo": lambda: surface.albedo(mirror.bsdf, mirror.si, mirror.valid),
+                "reflected_distance": lambda: mirror.masked(mirror.si.t),
+                "reflected_material_id": lambda: scene.material_ids(mirror.bsdf, mirror.valid),
+                "reflected_shape_id": lambda: scene.shape_ids(mirror.si.shape, mirror.valid),
+            }
+        if wanted & set(SETS["curvature"]):
+            first, second, direction = _principal_curvatures(hit)
+            names |= {
+                "curvature": lambda: mi.Vector2f(first, second),
+                "curvature_direction": lambda: direction,
+            }
+        if wanted & set(SETS["motion"]):
+            offset, seen = _motion(hit, pixel, previous_camera, resolution)
+            names |= {"motion": lambda: offset, "motion_valid": lambda: seen}
+        computed = {name: names[name]() for name in wanted}
+        return {name: list(v) if CHANNELS[name].components > 1 else [v] for name, v in computed.items()}
+
+    if scalar:
+        pixels = [values(mi.Point2f(x + 0.5, y + 0.5)) for y in range(height) for x in range(width)]
+        columns = {name: np.array([p[name] for p in pixels]) for name in wanted}
+    else:
+        index = dr.arange(mi.UInt32, width * height)
+        row = index // dr.opaque(mi.UInt32, width)
+        result = values(mi.Point2f(mi.Float(index - row * width) + 0.5, mi.Float(row) + 0.5))
+        dr.eval(result)
+        columns = {name: np.stack([np.array(c) for c in parts], axis=-1) for name, parts in result.items()}
+    return {
+        name: columns[name]
+        .reshape(height, width, CHANNELS[name].components)
+        .astype(np.uint32 if CHANNELS[name].dtype == "uint" else np.float32)
+        for name in CHANNELS
+        if name in wanted
+    }

@@ -1,0 +1,212 @@
+"""The factorized path tracer: one path gives all five radiance parts.
+
+The first hit is handled outside the loop. There the BSDF is evaluated per lobe, so a path carries two weights,
+one for the diffuse reflection and one for everything else; the rest of the path is shared by both. What the
+second vertex emits is direct light, all that comes later is indirect.
+
+Multiple importance sampling with the balance-heuristic power 2 (Veach 1997, section 9.2.4), next-event
+estimation at every vertex, Russian roulette from `RR_DEPTH` on: the same estimator as Mitsuba's `path`.
+"""
+
+# mypy: disable-error-code="no-untyped-def, misc"
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from gibench.rendering.backend import is_scalar
+
+RR_DEPTH = 5
+"""Scattering events after which Russian roulette may end a path, as in Mitsuba's `path`."""
+
+SMALLEST = 1.2e-38
+"""The smallest normal float32."""
+
+RR_CAP = 0.95
+"""Largest survival probability, so that a path in a white furnace ends too."""
+
+
+@dataclass
+class PathSample:
+    """What one path a lane brings home: (lanes,) arrays of mi.Color3f, radiance in W·m⁻²·sr⁻¹.
+
+    albedo and normal (world space, towards the viewer) of the first hit are None unless asked for.
+    """
+
+    emission: Any
+    direct_diffuse: Any
+    direct_specular: Any
+    indirect_diffuse: Any
+    indirect_specular: Any
+    albedo: Any = None
+    normal: Any = None
+
+
+def _inverse(x):
+    """1/x for x ≥ 0, where 0 gives something huge yet finite."""
+    return dr.rcp(dr.maximum(x, SMALLEST))
+
+
+def _mis_weight(pdf_a, pdf_b):
+    """Power heuristic for a sample drawn with `pdf_a`; 0 where it could not be drawn.
+
+    As a ratio, since the squares of densities near a mirror's overflow.
+    """
+    return dr.select(pdf_a > 0, dr.rcp(1 + dr.square(pdf_b * _inverse(pdf_a))), 0)
+
+
+def _lobes():
+    """BSDF contexts: everything, diffuse reflection alone, all but diffuse reflection."""
+    diffuse = int(mi.BSDFFlags.DiffuseReflection)
+    radiance = mi.TransportMode.Radiance
+    everything = int(mi.BSDFFlags.All)
+    return (
+        mi.BSDFContext(),
+        mi.BSDFContext(radiance, diffuse),
+        mi.BSDFContext(radiance, everything & ~diffuse),
+    )
+
+
+@cache
+def _black():
+    return mi.load_dict({"type": "diffuse", "reflectance": 0.0})
+
+
+def bsdf_at(si, ray):
+    """The BSDF at a hit. Where there is none the scalar variant has a null object, on which no call may be made."""
+    return _black() if is_scalar() and not si.is_valid() else si.bsdf(ray)
+
+
+def _emission(scene, si, active):
+    emitter = si.emitter(scene)
+    # None only in the scalar variant, where an array of pointers would hold a null.
+    return mi.Spectrum(0) if emitter is None else emitter.eval(si, active)
+
+
+def _emission_weight(scene, si, reference, pdf, delta, active):
+    """Weight of emission met by sampling the BSDF, against sampling the light from `reference`."""
+    if si.emitter(scene) is None:
+        return mi.Float(0)
+    towards = mi.DirectionSample3f(scene, si, reference)
+    return _mis_weight(pdf, scene.pdf_emitter_direction(reference, towards, active & (delta ^ True)))
+
+
+@dr.syntax
+def _indirect(scene, sampler, ray, reference, pdf, delta, weight, eta, active, max_depth):
+    """Follows a path from its first bounce on.
+
+    reference: the first hit (mi.Interaction3f); pdf, delta: of the direction taken there; weight: throughput of the
+    first bounce over both lobes, for Russian roulette. Returns emission met right after the first bounce (direct
+    light) and everything later, both per unit of first-bounce throughput.
+    """
+    context = mi.BSDFContext()
+    ray = mi.Ray3f(ray)
+    reference = mi.Interaction3f(reference)
+    pdf, delta = mi.Float(pdf), mi.Bool(delta)
+    weight, eta, active = mi.Spectrum(weight), mi.Float(eta), mi.Bool(active)
+    direct, later = mi.Spectrum(0), mi.Spectrum(0)
+    throughput = mi.Spectrum(1)
+    depth = mi.UInt32(1)
+
+    while active:
+        si = scene.ray_intersect(ray, mi.RayFlags.All, False, active)
+
+        # Emission at this vertex, weighted against the light sampling of the vertex before it.
+        share = _emission_weight(scene, si, reference, pdf, delta, active)
+        seen = throughput * _emission(scene, si, active) * share
+        direct += dr.select(depth == 1, seen, 0)
+        later += dr.select(depth == 1, 0, seen)
+
+        active &= si.is_valid() & (depth < max_depth)
+        bsdf = bsdf_at(si, ray)
+
+        # Light sampling.
+        lit = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
+        sample, light = scene.sample_emitter_direction(si, sampler.next_2d(), True, lit)
+        lit &= sample.pdf != 0
+        to_light = si.to_local(sample.d)
+        value, value_pdf, bounce, bounce_weight = bsdf.eval_pdf_sample(
+            context, si, to_light, sampler.next_1d(), sampler.next_2d(), active
+        )
+        value = si.to_world_mueller(value, -to_light, si.wi)
+        share = dr.select(sample.delta, 1, _mis_weight(sample.pdf, value_pdf))
+        later += dr.select(lit, throughput * value * light * share, 0)
+
+        # The next direction.
+        ray = si.spawn_ray(si.to_world(bounce.wo))
+        throughput *= si.to_world_mueller(bounce_weight, -bounce.wo, si.wi)
+        eta *= bounce.eta
+        reference = mi.Interaction3f(si)
+        pdf = bounce.pdf
+        delta = mi.has_flag(bounce.sampled_type, mi.BSDFFlags.Delta)
+        depth += 1
+
+        survival = dr.minimum(dr.max(throughput * weight) * dr.square(eta), RR_CAP)
+        roulette = depth >= RR_DEPTH
+        active &= survival > 0
+        active &= (roulette ^ True) | (sampler.next_1d() < survival)
+        throughput *= dr.select(roulette, _inverse(survival), 1)
+
+    return direct, later
+
+
+def trace_paths(scene, sampler, ray, *, max_depth: int, guides: bool = False) -> PathSample:
+    """Traces one path a lane and sorts its radiance.
+
+    scene: mitsuba.Scene. sampler: from `sampling`. ray: mi.Ray3f. max_depth: largest number of scattering events, ≥ 0
+    (Mitsuba's `path` counts segments: its max_depth is one more). guides: whether first-hit albedo and normal are
+    returned too.
+    """
+    everything, diffuse, other = _lobes()
+    si = scene.ray_intersect(ray, mi.RayFlags.All, True)
+    emission = _emission(scene, si, True)
+    active = si.is_valid() & (max_depth >= 1)
+    bsdf = bsdf_at(si, ray)
+
+    lit = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
+    sample, light = scene.sample_emitter_direction(si, sampler.next_2d(), True, lit)
+    lit &= sample.pdf != 0
+    to_light = si.to_local(sample.d)
+    share = dr.select(sample.delta, 1, _mis_weight(sample.pdf, bsdf.pdf(everything, si, to_light, lit)))
+    light = dr.select(lit, light * share, 0)
+    direct_diffuse = light * bsdf.eval(diffuse, si, to_light, lit)
+    direct_specular = light * bsdf.eval(other, si, to_light, lit)
+
+    bounce, whole = bsdf.sample(everything, si, sampler.next_1d(), sampler.next_2d(), active)
+    delta = mi.has_flag(bounce.sampled_type, mi.BSDFFlags.Delta)
+    smooth = active & (delta ^ True) & (bounce.pdf > 0)
+    density = dr.select(smooth, _inverse(bounce.pdf), 0)
+    weight_diffuse = bsdf.eval(diffuse, si, bounce.wo, smooth) * density
+    weight_other = dr.select(delta, whole, bsdf.eval(other, si, bounce.wo, smooth) * density)
+    weight = weight_diffuse + weight_other
+    active &= dr.max(weight) > 0
+
+    seen, later = _indirect(
+        scene,
+        sampler.independent,
+        si.spawn_ray(si.to_world(bounce.wo)),
+        mi.Interaction3f(si),
+        bounce.pdf,
+        delta,
+        weight,
+        bounce.eta,
+        active,
+        max_depth,
+    )
+
+    result = PathSample(
+        emission,
+        direct_diffuse + weight_diffuse * seen,
+        direct_specular + weight_other * seen,
+        weight_diffuse * later,
+        weight_other * later,
+    )
+    if guides:
+        # On a conductor this is a value of its lobe and may exceed 1; the denoiser wants [0, 1].
+        result.albedo = dr.select(si.is_valid(), dr.clip(bsdf.eval_diffuse_reflectance(si), 0, 1), 0)
+        result.normal = dr.select(si.is_valid(), dr.mulsign(si.sh_frame.n, dr.dot(si.n, -ray.d)), 0)
+    return result

@@ -1,0 +1,157 @@
+"""A scene that is ready to be rendered: Mitsuba's, with stable ids for its materials and shapes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gibench.errors import GibenchError
+from gibench.rendering.backend import is_scalar, select_variant
+
+
+class SceneError(GibenchError):
+    """A scene file that is not there or that Mitsuba refuses."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A loaded Mitsuba scene.
+
+    mi_scene: the `mitsuba.Scene`. materials, shapes: names by id; id i is entry i − 1, since id 0 is a miss. The order
+    is alphabetical by shape id (a material stands where its first shape does): Mitsuba loads in parallel and lists
+    shapes in an order of its own.
+    """
+
+    mi_scene: Any
+    materials: tuple[str, ...]
+    shapes: tuple[str, ...]
+    _material_of: dict[int, int]
+    _shape_of: dict[int, int]
+
+    @cached_property
+    def _tables(self) -> tuple[Any, Any]:
+        import drjit as dr
+        import mitsuba as mi
+
+        def table(ids: dict[int, int]) -> Any:
+            values = np.zeros(max(ids, default=0) + 1, dtype=np.uint32)
+            values[list(ids)] = list(ids.values())
+            array = mi.UInt32(values)
+            dr.make_opaque(array)
+            return array
+
+        return table(self._material_of), table(self._shape_of)
+
+    def material_ids(self, bsdf: Any, active: Any) -> Any:
+        """Ids (from 1) of an array of BSDF pointers; 0 where not `active`."""
+        import drjit as dr
+        import mitsuba as mi
+
+        if is_scalar():
+            return self._material_of.get(id(bsdf), 0) if active else 0
+        return dr.gather(mi.UInt32, self._tables[0], dr.reinterpret_array(mi.UInt32, bsdf), active)
+
+    def shape_ids(self, shape: Any, active: Any) -> Any:
+        """Ids (from 1) of an array of shape pointers; 0 where not `active`."""
+        import drjit as dr
+        import mitsuba as mi
+
+        if is_scalar():
+            return self._shape_of.get(id(shape), 0) if active else 0
+        return dr.gather(mi.UInt32, self._tables[1], dr.reinterpret_array(mi.UInt32, shape), active)
+
+
+def _key(pointer_type: Any, thing: Any) -> int:
+    """What identifies a plugin inside a kernel: its registry index, or the object itself in scalar mode."""
+    import drjit as dr
+    import mitsuba as mi
+
+    if is_scalar():
+        return id(thing)
+    return int(dr.reinterpret_array(mi.UInt32, pointer_type(thing))[0])
+
+
+def wrap(mi_scene: Any) -> Scene:
+    """The handle of a `mitsuba.Scene` that already exists, made under the current variant."""
+    import mitsuba as mi
+
+    materials: list[str] = []
+    material_of: dict[int, int] = {}
+    shapes: list[str] = []
+    shape_of: dict[int, int] = {}
+    for number, shape in enumerate(sorted(mi_scene.shapes(), key=lambda s: s.id())):
+        shapes.append(shape.id() or f"shape_{number}")
+        shape_of[_key(getattr(mi, "ShapePtr", None), shape)] = number + 1
+        bsdf = shape.bsdf()
+        if bsdf is None:
+            continue
+        key = _key(getattr(mi, "BSDFPtr", None), bsdf)
+        if key not in material_of:
+            materials.append(bsdf.id() or f"material_{len(materials)}")
+            material_of[key] = len(materials)
+    return Scene(mi_scene, tuple(materials), tuple(shapes), material_of, shape_of)
+
+
+def load_dict(description: dict[str, Any]) -> Scene:
+    """A scene from Mitsuba's dictionary form. Selects a variant where none is current."""
+    select_variant()
+    import mitsuba as mi
+
+    return wrap(mi.load_dict(description, optimize=False))
+
+
+def load_scene(path: str | Path) -> Scene:
+    """A scene from a Mitsuba 3 XML file. Selects a variant where none is current.
+
+    Raises SceneError where the file is missing or Mitsuba refuses it, with its reason.
+    """
+    select_variant()
+    import mitsuba as mi
+
+    if not Path(path).is_file():
+        raise SceneError(f"there is no scene file {path}")
+    try:
+        # Mitsuba would merge shapes that share a material, and their ids with them.
+        return wrap(mi.load_file(str(path), optimize=False))
+    except RuntimeError as error:
+        reason = " ".join(str(error).split())
+        raise SceneError(f"Mitsuba refuses {path}: {reason}") from error
+
+
+def cast_rays(scene: Scene, origins: ArrayLike, directions: ArrayLike) -> dict[str, NDArray[Any]]:
+    """First hits of rays, for placing things and judging views.
+
+    origins, directions: (N, 3) metres; directions need no unit length. Returns distance (N,) float32 in metres
+    along the ray, 0 on a miss; shape_id (N,) uint32, 0 on a miss; normal (N, 3) float32, the geometric one.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    start = np.ascontiguousarray(np.asarray(origins, dtype=np.float32).T)
+    towards = np.asarray(directions, dtype=np.float32)
+    towards = np.ascontiguousarray((towards / np.linalg.norm(towards, axis=1, keepdims=True)).T)
+    if is_scalar():
+        hits = [scene.mi_scene.ray_intersect(mi.Ray3f(o, d)) for o, d in zip(start.T, towards.T, strict=True)]
+        valid = np.array([h.is_valid() for h in hits])
+        return {
+            "distance": np.array(
+                [h.t if v else 0 for h, v in zip(hits, valid, strict=True)], dtype=np.float32
+            ),
+            "shape_id": np.array([scene.shape_ids(h.shape, h.is_valid()) for h in hits], dtype=np.uint32),
+            "normal": np.array(
+                [np.array(h.n) if v else np.zeros(3) for h, v in zip(hits, valid, strict=True)]
+            ),
+        }
+    ray = mi.Ray3f(mi.Point3f(start), mi.Vector3f(towards))
+    hit = scene.mi_scene.ray_intersect(ray, mi.RayFlags.Minimal, coherent=False)
+    valid = hit.is_valid()
+    distance = dr.select(valid, hit.t, 0)
+    shape = dr.select(valid, scene.shape_ids(hit.shape, valid), 0)
+    normal = dr.select(valid, hit.n, 0)
+    dr.eval(distance, shape, normal)
+    return {"distance": np.array(distance), "shape_id": np.array(shape), "normal": np.array(normal).T}

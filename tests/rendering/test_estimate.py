@@ -1,0 +1,113 @@
+"""Samples, passes and the standard error."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gibench.rendering import estimate as module
+from gibench.rendering.estimate import EstimateError, estimate_radiance, group_levels
+from gibench.rendering.render import render_frame
+from gibench.rendering.scene import load_dict
+
+from . import scenes
+
+
+@pytest.fixture(scope="module")
+def room():
+    return load_dict(scenes.box("coat"))
+
+
+@pytest.mark.parametrize(
+    ("spp", "levels"),
+    [(1, 0), (2, 0), (16, 0), (17, 0), (64, 1), (100, 1), (250, 0), (256, 2), (1000, 1), (1024, 3)],
+)
+def test_groups_divide_the_samples_and_are_enough(spp, levels):
+    assert group_levels(spp) == levels
+    assert spp % 4**levels == 0
+    assert levels == 0 or spp // 4**levels >= module.MINIMUM_GROUPS
+
+
+@pytest.mark.parametrize("spp", [16, 64])
+def test_standard_error_is_the_spread_over_seeds(room, spp):
+    """Mean of color_se² against the variance over 64 independent seeds."""
+    frames = [
+        render_frame(
+            room, scenes.CAMERA, resolution=(32, 32), channels=["color", "color_se"], spp=spp, seed=s
+        ).arrays
+        for s in range(64)
+    ]
+    spread = np.array([f["color"] for f in frames], dtype=np.float64).var(axis=0, ddof=1)
+    claimed = np.square(np.array([f["color_se"] for f in frames], dtype=np.float64)).mean(axis=0)
+    # Both are unbiased, pixel by pixel; what 64 seeds leave is noise, largest in the few pixels of large variance.
+    share = spread.mean(axis=-1) < np.quantile(spread.mean(axis=-1), 0.98)
+    assert claimed[share].sum() / spread[share].sum() == pytest.approx(1, abs=0.05)
+
+
+def test_same_seed_same_bits_whatever_the_block_of_pixels(room, monkeypatch):
+    options = {"resolution": (24, 16), "channels": ["radiance", "surface"], "spp": 64}
+    first = render_frame(room, scenes.CAMERA, seed=5, **options).arrays
+    again = render_frame(room, scenes.CAMERA, seed=5, **options).arrays
+    other = render_frame(room, scenes.CAMERA, seed=6, **options).arrays
+    for name, values in first.items():
+        np.testing.assert_array_equal(values, again[name])
+    assert (first["color"] != other["color"]).any()
+
+
+def test_mean_and_error_do_not_depend_on_how_samples_are_split(room, monkeypatch):
+    """In several launches the numbers come from other random streams, so they agree within their errors."""
+    options = {"resolution": (16, 16), "channels": ["color", "color_se"], "spp": 256, "max_depth": 2}
+    whole = render_frame(room, scenes.CAMERA, **options).arrays
+    monkeypatch.setattr(module, "LANES", 64 * 40)
+    split = render_frame(room, scenes.CAMERA, **options).arrays
+    error = np.sqrt(np.square(whole["color_se"]) + np.square(split["color_se"])) + 1e-6
+    z = (whole["color"] - split["color"]) / error
+    assert 0.5 < np.sqrt(np.mean(np.square(z))) < 1.5
+
+
+def test_error_target_is_met(room):
+    loose = render_frame(room, scenes.CAMERA, resolution=(32, 32), channels=["radiance"], error=0.2)
+    tight = render_frame(room, scenes.CAMERA, resolution=(32, 32), channels=["radiance"], error=0.05)
+    assert loose.median_error < 0.2
+    assert tight.median_error < 0.05
+    assert tight.spp > loose.spp
+
+
+def test_error_target_stops_at_the_cap(room):
+    frame = render_frame(
+        room, scenes.CAMERA, resolution=(16, 16), channels=["color"], error=1e-6, spp_cap=200
+    )
+    assert frame.spp == 192
+    assert frame.median_error > 1e-6
+
+
+def test_black_scene_has_no_error():
+    dark = scenes.box("diffuse")
+    del dark["lamp"]
+    frame = render_frame(load_dict(dark), scenes.CAMERA, resolution=(8, 8), channels=["radiance"], error=0.1)
+    assert frame.median_error == 0
+    assert not any(values.any() for values in frame.arrays.values())
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"spp": 4, "error": 0.1},
+        {"spp": 0},
+        {"spp": -3},
+        {"error": 0.0},
+        {"error": float("nan")},
+        {"error": 0.1, "spp_cap": 8},
+        {"spp": 4, "max_depth": -1},
+    ],
+)
+def test_bad_numbers_are_refused(room, options):
+    with pytest.raises(EstimateError):
+        estimate_radiance(room, scenes.CAMERA, (4, 4), **options)
+
+
+def test_one_sample_has_no_standard_error(room):
+    assert render_frame(room, scenes.CAMERA, resolution=(4, 4), channels=["color"], spp=1).spp == 1
+    with pytest.raises(EstimateError, match="color_se"):
+        render_frame(room, scenes.CAMERA, resolution=(4, 4), channels=["color_se"], spp=1)
