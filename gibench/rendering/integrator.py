@@ -1,7 +1,7 @@
 """The factorized path tracer: one path gives all five radiance parts.
 
-The first hit is handled outside the loop. There the BSDF is evaluated per lobe, so a path carries two weights,
-one for the diffuse reflection and one for everything else; the rest of the path is shared by both. What the
+The first hit is handled outside the loop. There the diffuse lobe is evaluated on its own, so a path carries two
+weights, one for the diffuse reflection and one for everything else; the rest of the path is shared by both. What the
 second vertex emits is direct light, all that comes later is indirect.
 
 Multiple importance sampling with the balance-heuristic power 2 (Veach 1997, section 9.2.4), next-event
@@ -59,16 +59,17 @@ def _mis_weight(pdf_a, pdf_b):
     return dr.select(pdf_a > 0, dr.rcp(1 + dr.square(pdf_b * _inverse(pdf_a))), 0)
 
 
-def _lobes():
-    """BSDF contexts: everything, diffuse reflection alone, all but diffuse reflection."""
-    diffuse = int(mi.BSDFFlags.DiffuseReflection)
-    radiance = mi.TransportMode.Radiance
-    everything = int(mi.BSDFFlags.All)
-    return (
-        mi.BSDFContext(),
-        mi.BSDFContext(radiance, diffuse),
-        mi.BSDFContext(radiance, everything & ~diffuse),
-    )
+_DIFFUSE = mi.BSDFFlags.DiffuseReflection
+_OTHER = int(mi.BSDFFlags.All) & ~int(_DIFFUSE)
+
+
+def _split(bsdf, value, diffuse):
+    """A BSDF's value as the share of its diffuse reflection and that of everything else, both ≥ 0.
+
+    A difference leaves dust of rounding, so what does not exist is set to 0.
+    """
+    other = dr.select((bsdf.flags() & _OTHER) != 0, dr.maximum(value - diffuse, 0), 0)
+    return diffuse, other
 
 
 @cache
@@ -161,28 +162,29 @@ def trace_paths(scene, sampler, ray, *, max_depth: int, guides: bool = False) ->
     (Mitsuba's `path` counts segments: its max_depth is one more). guides: whether first-hit albedo and normal are
     returned too.
     """
-    everything, diffuse, other = _lobes()
+    everything = mi.BSDFContext()
+    diffuse = mi.BSDFContext(mi.TransportMode.Radiance, int(_DIFFUSE))
     si = scene.ray_intersect(ray, mi.RayFlags.All, True)
     emission = _emission(scene, si, True)
     active = si.is_valid() & (max_depth >= 1)
     bsdf = bsdf_at(si, ray)
 
+    # The same calls as in the loop, and one more for the diffuse lobe alone: kernels stay small.
     lit = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
     sample, light = scene.sample_emitter_direction(si, sampler.next_2d(), True, lit)
     lit &= sample.pdf != 0
     to_light = si.to_local(sample.d)
-    share = dr.select(sample.delta, 1, _mis_weight(sample.pdf, bsdf.pdf(everything, si, to_light, lit)))
+    value, value_pdf, bounce, weight = bsdf.eval_pdf_sample(
+        everything, si, to_light, sampler.next_1d(), sampler.next_2d(), active
+    )
+    share = dr.select(sample.delta, 1, _mis_weight(sample.pdf, value_pdf))
     light = dr.select(lit, light * share, 0)
-    direct_diffuse = light * bsdf.eval(diffuse, si, to_light, lit)
-    direct_specular = light * bsdf.eval(other, si, to_light, lit)
+    value_diffuse, value_other = _split(bsdf, value, bsdf.eval(diffuse, si, to_light, lit))
 
-    bounce, whole = bsdf.sample(everything, si, sampler.next_1d(), sampler.next_2d(), active)
     delta = mi.has_flag(bounce.sampled_type, mi.BSDFFlags.Delta)
     smooth = active & (delta ^ True) & (bounce.pdf > 0)
-    density = dr.select(smooth, _inverse(bounce.pdf), 0)
-    weight_diffuse = bsdf.eval(diffuse, si, bounce.wo, smooth) * density
-    weight_other = dr.select(delta, whole, bsdf.eval(other, si, bounce.wo, smooth) * density)
-    weight = weight_diffuse + weight_other
+    bounce_diffuse = bsdf.eval(diffuse, si, bounce.wo, smooth) * dr.select(smooth, _inverse(bounce.pdf), 0)
+    weight_diffuse, weight_other = _split(bsdf, weight, bounce_diffuse)
     active &= dr.max(weight) > 0
 
     seen, later = _indirect(
@@ -200,8 +202,8 @@ def trace_paths(scene, sampler, ray, *, max_depth: int, guides: bool = False) ->
 
     result = PathSample(
         emission,
-        direct_diffuse + weight_diffuse * seen,
-        direct_specular + weight_other * seen,
+        light * value_diffuse + weight_diffuse * seen,
+        light * value_other + weight_other * seen,
         weight_diffuse * later,
         weight_other * later,
     )

@@ -1,0 +1,72 @@
+"""The factorized render against Mitsuba's own `path`: same scene, sampler, samples, filter and machine."""
+
+from __future__ import annotations
+
+import statistics
+import time
+
+import numpy as np
+import pytest
+
+from gibench.rendering.backend import select_variant
+from gibench.rendering.render import render_frame
+from gibench.rendering.scene import load_dict
+from tests.rendering import scenes
+
+pytestmark = pytest.mark.performance
+
+REPEATS = 5
+
+
+@pytest.fixture(scope="module", autouse=True)
+def variant():
+    return select_variant("auto")
+
+
+def _median_ratio(first, second):
+    """Medians of interleaved runs, after one warm-up of each, which compiles the kernels."""
+    times = ([], [])
+    for repeat in range(REPEATS + 1):
+        for run, column in zip((first, second), times, strict=True):
+            start = time.perf_counter()
+            run(repeat)
+            if repeat:
+                column.append(time.perf_counter() - start)
+    a, b = (statistics.median(column) for column in times)
+    return a, b, a / b
+
+
+@pytest.mark.parametrize("spp", [64, 256])
+@pytest.mark.parametrize("material", ["coat", "metal"])
+def test_factorized_render_against_path(spp, material):
+    scene = load_dict(scenes.box(material))
+    options = {"resolution": (256, 256), "spp": spp, "max_depth": 8}
+
+    def factorized(seed):
+        render_frame(scene, scenes.CAMERA, channels=["radiance", "surface", "reflection"], seed=seed, **options)
+
+    def path(seed):
+        scenes.render_path(scene.mi_scene, scenes.CAMERA, 256, spp, seed, 8)
+
+    ours, theirs, ratio = _median_ratio(factorized, path)
+    print(f"\n{material}, {spp} spp, 256²: factorized {ours:.2f} s, path {theirs:.2f} s, ratio {ratio:.2f} (reach 1.15)")
+
+
+def test_stratified_against_independent_samples():
+    """Variance of color at equal samples: what stratification saves, in the unit of samples."""
+    from gibench.rendering import estimate
+
+    scene = load_dict(scenes.box("coat"))
+
+    def variance(levels):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(estimate, "group_levels", lambda spp: levels)
+            frames = [
+                render_frame(scene, scenes.CAMERA, resolution=(64, 64), spp=64, seed=s, channels=["color"])
+                for s in range(12)
+            ]
+        return np.array([f.arrays["color"] for f in frames], dtype=float).var(axis=0, ddof=1).mean()
+
+    plain = variance(0)
+    for levels in (1, 2, 3):
+        print(f"\nvariance with groups of {4**levels}: {variance(levels) / plain:.2f} of independent samples")

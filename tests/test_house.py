@@ -1,0 +1,57 @@
+"""Who may import whom: the table of the house, checked on the source."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import gibench
+
+PACKAGE = Path(gibench.__file__).parent
+
+MAY_IMPORT = {
+    "metrics": set(),
+    "rendering": set(),
+    "generators": {"rendering"},
+    "datasets": {"rendering", "generators", "metrics"},
+    "baselines": {"rendering", "datasets", "metrics"},
+    "benchmarks": {"rendering", "generators", "metrics", "datasets", "baselines"},
+    "cli": {"rendering", "generators", "metrics", "datasets", "baselines", "benchmarks"},
+}
+
+
+def rooms():
+    return sorted(p.name for p in PACKAGE.iterdir() if (p / "__init__.py").exists())
+
+
+def imports(path):
+    """Dotted names of what a file imports from gibench, relative imports resolved."""
+    package = ("gibench", *path.relative_to(PACKAGE).parent.parts)
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = ".".join(package[: len(package) - node.level + 1]) if node.level else ""
+            stem = ".".join(filter(None, (base, node.module)))
+            yield from (f"{stem}.{alias.name}" for alias in node.names)
+
+
+@pytest.mark.parametrize("room", rooms())
+def test_no_import_runs_up_the_table(room):
+    allowed = MAY_IMPORT[room] | {room, "errors", "__version__"}
+    for path in (PACKAGE / room).rglob("*.py"):
+        for name in imports(path):
+            parts = name.split(".")
+            if parts[0] == "gibench" and len(parts) > 1:
+                assert parts[1] in allowed, f"{path.relative_to(PACKAGE)} imports {name}"
+
+
+@pytest.mark.parametrize("room", rooms())
+def test_importing_a_room_loads_neither_mitsuba_nor_torch(room):
+    code = f"import sys, gibench.{room}; print(sorted({{'mitsuba', 'drjit', 'torch', 'colour'}} & set(sys.modules)))"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    assert result.stdout.strip() == "[]", result.stdout + result.stderr
