@@ -1,0 +1,19 @@
+"""Which commands there are. Nothing heavy is imported before a command runs, so that `--help` is quick."""
+
+from __future__ import annotations
+
+import typer
+
+from gibench.cli import dataset, doctor
+
+app = typer.Typer(
+    name="gibench",
+    help="Datasets for, and an honest comparison of, real-time global illumination.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+)
+app.add_typer(dataset.app, name="dataset")
+app.command("doctor")(doctor.doctor)
+
+make_app = typer.Typer(name="make-dataset", add_completion=False, pretty_exceptions_enable=False)
+make_app.command()(dataset.make)

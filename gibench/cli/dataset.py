@@ -1,0 +1,183 @@
+"""`gibench dataset make | verify | info | preview`, and `make-dataset`."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from gibench.errors import GibenchError
+
+if TYPE_CHECKING:
+    from gibench.datasets.recipes import Recipe
+
+app = typer.Typer(help="Make, check and look at datasets.", no_args_is_help=True)
+
+Folder = Annotated[Path, typer.Argument(metavar="DIR", help="The dataset's folder.", show_default=False)]
+
+
+@app.command()
+def make(
+    rooms: Annotated[int | None, typer.Option(help="How many rooms.", show_default="the preset's")] = None,
+    out: Annotated[Path | None, typer.Option(help="Where to.", show_default="data/PRESET")] = None,
+    preset: Annotated[str | None, typer.Option(help="smoke, small or paper.", show_default="small")] = None,
+    recipe: Annotated[
+        Path | None, typer.Option(help="A recipe of your own (TOML).", show_default=False)
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Decides every room.", show_default="0")] = None,
+    views: Annotated[int | None, typer.Option(help="Frames a room.", show_default=False)] = None,
+    resolution: Annotated[str | None, typer.Option(help="Such as 256x192.", show_default=False)] = None,
+    spp: Annotated[int | None, typer.Option(help="Samples a pixel.", show_default=False)] = None,
+    error: Annotated[
+        float | None,
+        typer.Option(help="Sample until the median relative error is below.", show_default=False),
+    ] = None,
+    channels: Annotated[
+        str | None, typer.Option(help="Sets or channels, such as radiance,surface.", show_default=False)
+    ] = None,
+    kind: Annotated[
+        str | None, typer.Option(help="Kinds of rooms, such as living,office.", show_default="all")
+    ] = None,
+    variant: Annotated[str, typer.Option(help="Mitsuba's, or auto: the fastest that works.")] = "auto",
+    workers: Annotated[int, typer.Option(help="Processes that render at the same time.")] = 1,
+    dry_run: Annotated[
+        bool,
+        typer.Option("--dry-run", help="Build and check the rooms; keep nothing, estimate time and disk."),
+    ] = False,
+) -> None:
+    """Make a dataset of furnished rooms, or continue or extend the one that the folder holds."""
+    if preset is not None and recipe is not None:
+        raise _usage("--preset and --recipe exclude each other: keep one of them")
+    if workers < 1:
+        raise _usage(f"--workers: {workers} is not allowed; allowed is an integer from 1")
+    asked = {
+        "rooms": rooms,
+        "seed": seed,
+        "views": views,
+        "resolution": None if resolution is None else _resolution(resolution),
+        "spp": spp,
+        "error": error,
+        "channels": None if channels is None else _names(channels, "--channels"),
+        "kinds": None if kind is None else _names(kind, "--kind"),
+    }
+    chosen = _recipe(preset, recipe, {key: value for key, value in asked.items() if value is not None})
+    _check_variant(variant)
+    root = out or Path("data") / (recipe.stem if recipe is not None else preset or "small")
+    if dry_run:
+        from gibench.cli.making import dry_run as estimate_and_tell
+
+        estimate_and_tell(chosen, variant, workers)
+        return
+    given = {
+        "--rooms": chosen.rooms,
+        "--out": root,
+        "--preset": preset,
+        "--recipe": recipe,
+        "--seed": seed,
+        "--views": views,
+        "--resolution": resolution,
+        "--spp": spp,
+        "--error": error,
+        "--channels": channels,
+        "--kind": kind,
+        "--variant": None if variant == "auto" else variant,
+        "--workers": None if workers == 1 else workers,
+    }
+    words = [str(word) for option, value in given.items() if value is not None for word in (option, value)]
+    from gibench.cli.making import make_and_tell
+
+    make_and_tell(root, chosen, variant, workers, shlex.join(["make-dataset", *words]))
+
+
+@app.command()
+def verify(folder: Folder) -> None:
+    """Check a dataset: hashes, completeness, finite values, color equal to the sum of its parts."""
+    from gibench.cli.progress import counting
+    from gibench.datasets.verifying import verify as problems_of
+
+    with counting("rooms checked") as on_room:
+        problems = problems_of(folder, on_room)
+    for problem in problems:
+        typer.echo(f"{folder / problem.file}: {problem.what}")
+    if problems:
+        files = len({problem.file for problem in problems})
+        typer.echo(f"error: {len(problems)} problems in {files} files of {folder}", err=True)
+        raise typer.Exit(1)
+    typer.echo(f"{folder} is whole: every file is as it was written, every frame keeps the channel contract")
+
+
+@app.command()
+def info(folder: Folder) -> None:
+    """Say what a dataset holds and how it was made."""
+    from gibench.cli.making import describe
+    from gibench.datasets.manifest import read_manifest
+
+    describe(folder, read_manifest(folder))
+
+
+@app.command()
+def preview(
+    folder: Folder,
+    frame: Annotated[
+        int | None, typer.Option(help="One frame with all its channels, by its number.", show_default=False)
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Where to.", show_default="preview.png or frame-N.png in DIR")
+    ] = None,
+) -> None:
+    """Draw a contact sheet, or one frame with all its channels."""
+    from gibench.datasets.errors import DatasetError
+    from gibench.datasets.loading import open_dataset
+    from gibench.datasets.previews import contact_sheet, frame_panel, write_picture
+
+    dataset = open_dataset(folder)
+    if not len(dataset):
+        raise DatasetError(f"{folder} has no frame yet; to continue it run `{dataset.manifest['command']}`")
+    if frame is None:
+        path, picture = out or folder / "preview.png", contact_sheet(folder, dataset.frames)
+    elif 0 <= frame < len(dataset):
+        path, picture = out or folder / f"frame-{frame}.png", frame_panel(dataset[frame])
+    else:
+        raise _usage(f"--frame: there is no frame {frame}; {folder} has frames 0 to {len(dataset) - 1}")
+    try:
+        write_picture(path, picture)
+    except OSError as problem:
+        raise GibenchError(f"{path} cannot be written: {problem.strerror}") from None
+    typer.echo(str(path))
+
+
+def _recipe(preset: str | None, recipe: Path | None, overrides: dict[str, Any]) -> Recipe:
+    from gibench.datasets.recipes import load_preset, load_recipe
+
+    return load_recipe(recipe, overrides) if recipe is not None else load_preset(preset or "small", overrides)
+
+
+def _check_variant(variant: str) -> None:
+    from gibench.datasets.errors import nearest
+    from gibench.rendering.backend import VARIANTS
+
+    if variant not in ("auto", *VARIANTS):
+        raise _usage(f"--variant: no variant '{variant}'; {nearest(variant, ('auto', *VARIANTS))}")
+
+
+def _resolution(text: str) -> tuple[int, int]:
+    match = re.fullmatch(r"(\d{1,6})[x×](\d{1,6})", text.strip().lower())
+    if match is None:
+        raise _usage(f"--resolution: '{text}' is no resolution; write WIDTHxHEIGHT, like 256x192")
+    return int(match[1]), int(match[2])
+
+
+def _names(text: str, option: str) -> tuple[str, ...]:
+    names = tuple(name.strip() for name in text.split(",") if name.strip())
+    if not names:
+        raise _usage(f"{option}: '{text}' names nothing; write names with commas between them")
+    return names
+
+
+def _usage(message: str) -> GibenchError:
+    from gibench.datasets.errors import RecipeError
+
+    return RecipeError(message)

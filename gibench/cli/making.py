@@ -1,0 +1,92 @@
+"""What `make-dataset` and `gibench dataset info` say."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from gibench.cli.progress import amount, counting, duration, making
+from gibench.datasets.estimating import estimate
+from gibench.datasets.making import make
+from gibench.datasets.recipes import Recipe
+
+
+def make_and_tell(root: Path, recipe: Recipe, variant: str, workers: int, command: str) -> None:
+    """Make a dataset with a progress bar, then say what there is."""
+    with making() as on_progress:
+        summary = make(
+            root, recipe, variant=variant, workers=workers, command=command, on_progress=on_progress
+        )
+    if summary.made == 0:
+        typer.echo(f"{root} is already complete")
+    describe(root, summary.manifest)
+    if summary.made:
+        frames = summary.made * recipe.views
+        typer.echo(_row("this run", f"{duration(summary.seconds)}, {summary.seconds / frames:.2f} s a frame"))
+        typer.echo(_row("look at it", f"{root / 'preview.png'}"))
+
+
+def describe(root: Path, manifest: dict[str, Any]) -> None:
+    """Say what a dataset holds, from its manifest."""
+    recipe, totals = manifest["recipe"], manifest.get("totals")
+    width, height = recipe["resolution"]
+    samples = f"{recipe['spp']} spp" if recipe["error"] is None else f"until error {recipe['error']:g}"
+    done = "" if manifest["complete"] else f" of {recipe['rooms']}, not complete"
+    typer.echo(_row("dataset", str(root)))
+    if totals is not None:
+        splits = ", ".join(f"{name} {count}" for name, count in totals["splits"].items())
+        typer.echo(_row("rooms", f"{totals['rooms']}{done}"))
+        typer.echo(_row("frames", f"{totals['frames']} ({splits}), {width}x{height}, {samples}"))
+    denoised = "denoised" if recipe["denoise"] else "not denoised"
+    typer.echo(_row("channels", f"{len(recipe['channels'])}, {denoised}"))
+    if totals is not None:
+        if totals["median_error"] is not None:
+            typer.echo(_row("median error", f"{100 * totals['median_error']:.2g} % (of the samples)"))
+        typer.echo(
+            _row("size", f"{amount(totals['bytes'], 'B')} ({amount(totals['frame_bytes'], 'B')} in frames)")
+        )
+        if totals["kernel_seconds"] > 0:
+            speed = amount(totals["paths"] / totals["kernel_seconds"], "paths/s")
+            typer.echo(_row("rendering", f"{duration(totals['kernel_seconds'])} in kernels, {speed}"))
+        if totals["invalid_paths"]:
+            typer.echo(_row("invalid paths", f"{totals['invalid_paths']}, counted as 0"))
+    _tell_rejections(manifest.get("rejections", {}), manifest["rejected_rooms"])
+    versions = manifest["versions"]
+    typer.echo(
+        _row(
+            "made with",
+            f"gibench {versions['gibench']}, Mitsuba {versions['mitsuba']}, {manifest['variant']}",
+        )
+    )
+    typer.echo(_row("licence", manifest["licence"]))
+    typer.echo(_row("command", manifest["command"]))
+
+
+def dry_run(recipe: Recipe, variant: str, workers: int) -> None:
+    """Build and check every room, then say what the dataset would take."""
+    with counting("rooms built and checked") as on_room:
+        result = estimate(recipe, variant=variant, workers=workers, on_room=on_room)
+    most = "at most " if recipe.spp is None else "about "
+    typer.echo(_row("rooms", f"{result.rooms} built and checked, {1000 * result.build_seconds:.0f} ms each"))
+    _tell_rejections(result.rejections, result.rejected_rooms)
+    typer.echo(_row("frames", f"{result.frames}, about {result.seconds_per_frame:.2g} s each"))
+    speed = amount(result.paths_per_second, "paths/s")
+    typer.echo(_row("time", f"{most}{duration(result.seconds)} ({result.variant}, {speed})"))
+    typer.echo(_row("disk", f"about {amount(result.bytes, 'B')}"))
+    typer.echo("Time and disk are scaled from one small frame of a first room; nothing was kept.")
+
+
+def _tell_rejections(rejections: dict[str, int], rooms: dict[Any, str]) -> None:
+    if rejections:
+        listed = ", ".join(
+            f"{reason} {count}" for reason, count in sorted(rejections.items(), key=lambda r: -r[1])
+        )
+        typer.echo(_row("rejected", f"{sum(rejections.values())} tries: {listed}"))
+    for room, reason in rooms.items():
+        typer.echo(_row("left out", f"room {room}: {reason}"))
+
+
+def _row(name: str, value: str) -> str:
+    return f"{name:<14}{value}"

@@ -1,0 +1,160 @@
+"""What a dataset would take: every room built and checked, one frame measured, nothing kept."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from gibench.datasets import exr, pool
+from gibench.datasets.making import default_threads
+from gibench.datasets.recipes import Recipe
+from gibench.datasets.room_making import Renderer, rendered_frame, sampled_room
+from gibench.generators.parts import Room
+
+#: The frame that is measured: at most this wide, and this many samples a pixel.
+MEASURED_WIDTH, MEASURED_SPP = 256, 16
+
+
+@dataclass
+class Estimate:
+    """What a dataset would take on this machine.
+
+    rooms, rejected_rooms, rejections: counted, not estimated (rejections: reason → count over rooms and
+    views). build_seconds: per room, measured on all rooms. paths_per_second, seconds_per_frame,
+    bytes_per_room, bytes_per_frame: scaled from one measured frame. seconds: wall time of the whole making.
+    With a recipe that stops at an error, samples are taken to reach the cap, so that seconds are the most
+    that it can take.
+    """
+
+    recipe: Recipe
+    workers: int
+    rooms: int = 0
+    variant: str = ""
+    rejected_rooms: dict[int, str] = field(default_factory=dict)
+    rejections: Counter[str] = field(default_factory=Counter)
+    build_seconds: float = 0.0
+    paths_per_second: float = 0.0
+    seconds_per_frame: float = 0.0
+    bytes_per_room: float = 0.0
+    bytes_per_frame: float = 0.0
+    load_seconds: float = 0.0
+
+    @property
+    def frames(self) -> int:
+        """Number of frames of the rooms that could be built."""
+        return self.rooms * self.recipe.views
+
+    @property
+    def bytes(self) -> float:
+        """Size of the dataset."""
+        return self.rooms * self.bytes_per_room + self.frames * self.bytes_per_frame
+
+    @property
+    def seconds(self) -> float:
+        """Wall time. What was measured is one worker's, with its share of the cores."""
+        rooms = self.rooms * (self.build_seconds + self.load_seconds)
+        return (rooms + self.frames * self.seconds_per_frame) / min(self.workers, max(self.rooms, 1))
+
+
+@dataclass
+class RoomChecker:
+    """Builds and checks a room and forgets it; the first of a worker is also rendered, small."""
+
+    recipe: Recipe
+    has_measured: bool = False
+
+    def __call__(self, room: int, report: pool.Report) -> dict[str, Any]:
+        """Return "rejections" and "seconds", "measured" once a worker, or "rejected": reason."""
+        from gibench.generators.rooms import RejectedRoom
+
+        started = time.perf_counter()
+        try:
+            built = sampled_room(self.recipe, room)
+        except RejectedRoom as reason:
+            return {"rejected": str(reason)}
+        seconds = time.perf_counter() - started
+        measured = None if self.has_measured else self._measured(built)
+        self.has_measured = True
+        return {"rejections": dict(built.rejections), "seconds": seconds, "measured": measured}
+
+    def _measured(self, room: Room) -> dict[str, float]:
+        from gibench.generators.scene_files import write_room
+        from gibench.rendering.scene import load_scene
+
+        recipe = self.recipe
+        width = min(recipe.resolution[0], MEASURED_WIDTH)
+        height = max(1, round(recipe.resolution[1] * width / recipe.resolution[0]))
+        settings = {"resolution": (width, height), "spp": MEASURED_SPP, "error": None}
+        with tempfile.TemporaryDirectory(prefix="gibench-") as scratch:
+            started = time.perf_counter()
+            write_room(room, scratch)
+            scene = load_scene(Path(scratch) / "scene.xml")
+            load_seconds = time.perf_counter() - started
+            size = sum(file.stat().st_size for file in Path(scratch).rglob("*") if file.is_file())
+            rendered_frame(recipe, scene, room, 0, **settings)  # compiles the kernels
+            frame = rendered_frame(recipe, scene, room, 0, **settings)
+        started = time.perf_counter()
+        content = exr.encode(frame.arrays)
+        pixels = width * height
+        return {
+            "paths_per_second": frame.paths / max(frame.kernel_seconds, 1e-9),
+            "pixel_seconds": (frame.seconds - frame.kernel_seconds + time.perf_counter() - started) / pixels,
+            "pixel_bytes": len(content) / pixels,
+            "room_bytes": size,
+            "load_seconds": load_seconds,
+        }
+
+
+def estimate(
+    recipe: Recipe,
+    *,
+    variant: str = "auto",
+    workers: int = 1,
+    on_room: Callable[[int, int], None] = lambda done, of: None,
+    work: pool.Work | None = None,
+) -> Estimate:
+    """Build and check every room of a recipe; estimate time and disk from one small frame.
+
+    on_room: called with (rooms checked, rooms in all). work: what workers do, by default `RoomChecker`.
+    Raises `MakingError`.
+    """
+    result = Estimate(recipe, workers)
+    build_seconds: list[float] = []
+
+    def ready(facts: dict[str, Any]) -> None:
+        result.variant = facts["variant"]
+
+    def done(room: int, answer: dict[str, Any]) -> None:
+        if "rejected" in answer:
+            result.rejected_rooms[room] = answer["rejected"]
+        else:
+            result.rooms += 1
+            result.rejections.update(answer["rejections"])
+            build_seconds.append(answer["seconds"])
+        if answer.get("measured"):
+            _scale(result, answer["measured"])
+        on_room(result.rooms + len(result.rejected_rooms), recipe.rooms)
+
+    work = work or pool.Work(
+        Renderer(variant, default_threads(workers), recipe.environment), RoomChecker(recipe)
+    )
+    listener = pool.Listener(ready, lambda room, kind, content: None, done, lambda room: None)
+    pool.run_rooms(work, range(recipe.rooms), listener, workers=min(workers, recipe.rooms))
+    result.build_seconds = sum(build_seconds) / max(len(build_seconds), 1)
+    return result
+
+
+def _scale(result: Estimate, measured: dict[str, float]) -> None:
+    recipe = result.recipe
+    pixels = recipe.resolution[0] * recipe.resolution[1]
+    result.paths_per_second = measured["paths_per_second"]
+    paths = pixels * (recipe.spp or recipe.spp_cap)
+    result.seconds_per_frame = paths / measured["paths_per_second"] + pixels * measured["pixel_seconds"]
+    result.bytes_per_frame = pixels * measured["pixel_bytes"]
+    result.bytes_per_room = measured["room_bytes"]
+    result.load_seconds = measured["load_seconds"]

@@ -1,0 +1,58 @@
+"""Files that appear under their name only when they are whole."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write beside, sync, rename: after a crash at any instant `path` is the old file or the new one.
+
+    Raises OSError; nothing is left behind then.
+    """
+    beside = path.with_name(f".{path.name}.partial-{os.getpid()}")
+    try:
+        with open(beside, "wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(beside, path)
+    except BaseException:
+        beside.unlink(missing_ok=True)
+        raise
+    sync_folder(path.parent)
+
+
+def as_json(value: Any) -> bytes:
+    """Indented JSON that ends with a line break. Raises ValueError for numbers that are not finite."""
+    return (json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()
+
+
+def sync_file(path: Path) -> None:
+    """Make sure that the content of a file that is already closed has reached the disk."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def sync_folder(folder: Path) -> None:
+    """Make sure that the names in a folder have reached the disk, where the system has such a call."""
+    if hasattr(os, "O_DIRECTORY"):
+        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+
+def sync_tree(folder: Path) -> None:
+    """Make sure that everything below a folder has reached the disk."""
+    for where, _, names in os.walk(folder):
+        for name in names:
+            sync_file(Path(where) / name)
+        sync_folder(Path(where))

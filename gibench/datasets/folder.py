@@ -1,0 +1,127 @@
+"""The folder of a dataset while it is being made: who may write to it, what in it is whole."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from gibench.datasets.errors import FolderError
+
+MANIFEST = "dataset.json"
+TABLE = "frames.parquet"
+PREVIEW = "preview.png"
+RECORD = "frames.json"
+LOCK = ".lock"
+
+
+def room_folder(root: Path, room: int) -> Path:
+    """Where a whole room lies."""
+    return root / "rooms" / f"{room:06d}"
+
+
+def partial_folder(root: Path, room: int, owner: int) -> Path:
+    """Where process number `owner` builds a room until it is whole."""
+    return root / "rooms" / f".{room:06d}.partial-{owner}"
+
+
+def whole_rooms(root: Path) -> list[int]:
+    """Numbers of the rooms that are whole, ascending. A room folder gets its name only when it is."""
+    rooms = root / "rooms"
+    names = [entry.name for entry in rooms.iterdir()] if rooms.is_dir() else []
+    return sorted(int(name) for name in names if name.isdigit() and (rooms / name / RECORD).is_file())
+
+
+def remove_partials(root: Path, room: int | None = None) -> None:
+    """Remove what killed processes left of a room, or of all rooms. Only for the holder of the lock."""
+    stem = "*" if room is None else f"{room:06d}"
+    for left in (root / "rooms").glob(f".{stem}.partial-*"):
+        shutil.rmtree(left, ignore_errors=True)
+    if room is None:
+        for left in root.glob(".*.partial-*"):
+            left.unlink(missing_ok=True)
+
+
+def remove_empty_dataset(root: Path) -> None:
+    """Remove what a dataset without any whole room consists of. Only for the holder of the lock."""
+    for name in (MANIFEST, TABLE, PREVIEW):
+        (root / name).unlink(missing_ok=True)
+    _remove_empty([root / "rooms"])
+
+
+@contextmanager
+def claimed(root: Path) -> Iterator[None]:
+    """Hold the folder of a dataset for one run alone, and make it where it does not exist.
+
+    On the way out the lock goes, and so do the folders that were made here if nothing was put into them.
+    Raises `FolderError`: it is a file, cannot be written, holds something that is no dataset, or is in use.
+    """
+    made = [folder for folder in (root, *root.parents) if not folder.exists()]
+    try:
+        root.mkdir(parents=True, exist_ok=True)
+        if not (root / MANIFEST).exists():
+            _refuse_foreign(root)
+        lock = _locked(root)
+    except OSError as problem:
+        _remove_empty(made)
+        raise FolderError(_why_not(root, problem)) from None
+    try:
+        remove_partials(root)
+        yield
+    finally:
+        remove_partials(root)
+        (root / LOCK).unlink(missing_ok=True)
+        os.close(lock)
+        _remove_empty(made)
+
+
+def _refuse_foreign(root: Path) -> None:
+    # `rooms` without a manifest is not ours: the manifest is written before the first room.
+    foreign = sorted(
+        entry.name for entry in root.iterdir() if not entry.name.startswith((LOCK, f".{MANIFEST}."))
+    )
+    if foreign:
+        raise FolderError(
+            f"{root} holds files but no dataset ({foreign[0]} …): choose an empty or a new folder with --out"
+        )
+
+
+def _why_not(root: Path, problem: OSError) -> str:
+    if isinstance(problem, FileExistsError | NotADirectoryError):
+        return f"{root} is no folder, or lies under a file: choose another with --out"
+    if problem.errno == errno.ENOSPC:
+        return f"no space is left for {root}: free some, or choose another disk with --out"
+    return f"{root} cannot be written ({problem.strerror}): choose another folder with --out"
+
+
+def _locked(root: Path) -> int:
+    """Descriptor of the lock file, held by this process until it ends, however it ends."""
+    import fcntl  # Unix; imported here so that reading datasets works everywhere
+
+    while True:
+        descriptor = os.open(root / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(descriptor)
+            raise FolderError(
+                f"{root} is in use by another run: wait for it, or write elsewhere with --out"
+            ) from None
+        # Another run may have removed the file between opening and locking; then this lock guards nothing.
+        try:
+            if os.fstat(descriptor).st_ino == os.stat(root / LOCK).st_ino:
+                return descriptor
+        except FileNotFoundError:
+            pass
+        os.close(descriptor)
+
+
+def _remove_empty(folders: Iterable[Path]) -> None:
+    for folder in folders:
+        try:
+            folder.rmdir()
+        except OSError:
+            return

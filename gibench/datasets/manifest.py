@@ -1,0 +1,241 @@
+"""`dataset.json` and `frames.parquet`: what a dataset says about itself.
+
+Each room carries its own record (`frames.json`), written with the room. The manifest and the table are
+gathered from these records, so they can be written anew at any time.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from gibench.datasets.errors import DatasetError, FolderError
+from gibench.datasets.files import as_json, write_whole
+from gibench.datasets.folder import MANIFEST, RECORD, TABLE, room_folder, whole_rooms
+from gibench.datasets.recipes import Recipe
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+#: Version of the layout on disk; a reader refuses what it does not know.
+FORMAT = 1
+
+
+def read_manifest(root: Path) -> dict[str, Any]:
+    """Read `dataset.json`. Raises `DatasetError` when the folder is no dataset or of another format."""
+    try:
+        manifest = json.loads((root / MANIFEST).read_text(encoding="utf-8"))
+        known = manifest["format"] == FORMAT
+    except OSError:
+        raise DatasetError(f"{root} is no dataset: it has no readable {MANIFEST}") from None
+    except (ValueError, KeyError, TypeError):
+        raise DatasetError(f"{root / MANIFEST} is damaged: it is no manifest of a dataset") from None
+    if not known:
+        raise DatasetError(
+            f"{root} is of format {manifest['format']}, this gibench reads format {FORMAT}: install the "
+            f"gibench that made it ({manifest.get('versions', {}).get('gibench', 'unknown')})"
+        )
+    return dict(manifest)
+
+
+def recipe_of(manifest: Mapping[str, Any]) -> Recipe:
+    """Return the recipe that a dataset was made from."""
+    return Recipe.model_validate(manifest["recipe"])
+
+
+def new_manifest(
+    recipe: Recipe, facts: Mapping[str, Any], machine: Mapping[str, Any], command: str
+) -> dict[str, Any]:
+    """Return the manifest of a dataset that has no room yet. facts: what `Renderer` answered."""
+    return {
+        "format": FORMAT,
+        "complete": False,
+        "recipe": recipe.model_dump(mode="json"),
+        "identity": recipe.identity(),
+        "licence": recipe.licence,
+        "command": command,
+        "variant": facts["variant"],
+        "versions": dict(facts["versions"]),
+        "machine": {**machine, "gpu": facts["gpu"]},
+        "runs": [],
+        "rejected_rooms": {},
+    }
+
+
+def refuse_other(root: Path, manifest: Mapping[str, Any], recipe: Recipe) -> None:
+    """Raise `FolderError` where a folder's dataset is not the one that a recipe asks for.
+
+    More rooms than there are is no difference: the dataset is extended.
+    """
+    there, asked = dict(manifest["identity"]), recipe.identity()
+    differences = {
+        key: (there.get(key), asked.get(key))
+        for key in [*asked, *(there.keys() - asked.keys())]
+        if there.get(key) != asked.get(key)
+    }
+    if recipe.rooms < manifest["recipe"]["rooms"]:
+        differences = {"rooms": (manifest["recipe"]["rooms"], recipe.rooms)} | differences
+    if differences:
+        listed = "; ".join(
+            f"{key}: {_short(a)} there, {_short(b)} asked" for key, (a, b) in differences.items()
+        )
+        raise FolderError(
+            f"{root} holds another dataset ({listed}): to continue it run `{manifest['command']}`, "
+            "for a new one choose another --out"
+        )
+
+
+def refuse_other_makers(root: Path, manifest: Mapping[str, Any], facts: Mapping[str, Any]) -> None:
+    """Raise `FolderError` where this machine's variant or versions would mix other pixels into a dataset."""
+    there = {"variant": manifest["variant"], **manifest["versions"]}
+    here = {"variant": facts["variant"], **facts["versions"]}
+    listed = "; ".join(
+        f"{key}: {there.get(key)} there, {here.get(key)} here"
+        for key in {**there, **here}
+        if there.get(key) != here.get(key)
+    )
+    if listed:
+        raise FolderError(
+            f"{root} was begun with something else ({listed}) and its pixels would not match: "
+            "use what began it (--variant, pip install), or choose another --out"
+        )
+
+
+def _short(value: Any) -> str:
+    text = json.dumps(value, ensure_ascii=False)
+    return text if len(text) <= 60 else text[:57] + "…"
+
+
+def room_record(root: Path, room: int) -> dict[str, Any]:
+    """Read the record of a whole room. Raises `DatasetError` when it is damaged."""
+    path = room_folder(root, room) / RECORD
+    try:
+        return dict(json.loads(path.read_text(encoding="utf-8")))
+    except (OSError, ValueError) as problem:
+        raise DatasetError(
+            f"{path} is damaged ({problem}): remove {path.parent} and make the room again"
+        ) from None
+
+
+def gathered(root: Path, manifest: Mapping[str, Any]) -> tuple[dict[str, Any], pd.DataFrame]:
+    """Gather the records of all whole rooms into the manifest with its totals and the table of frames."""
+    records = [room_record(root, room) for room in whole_rooms(root)]
+    recipe = recipe_of(manifest)
+    table = frame_table(records, recipe)
+    rejections: Counter[str] = Counter()
+    for record in records:
+        rejections.update(record["rejections"])
+    rejected = {r: why for r, why in manifest["rejected_rooms"].items() if int(r) < recipe.rooms}
+    files = sum(file["bytes"] for record in records for file in record["files"].values())
+    totals = {
+        "rooms": len(records),
+        "frames": len(table),
+        "bytes": int(table["bytes"].sum()) + files,
+        "frame_bytes": int(table["bytes"].sum()),
+        "paths": int(table["paths"].sum()),
+        "invalid_paths": int(table["invalid_paths"].sum()),
+        "kernel_seconds": float(table["kernel_seconds"].sum()),
+        "denoise_seconds": float(table["denoise_seconds"].sum()),
+        "room_seconds": {
+            lap: sum(record["seconds"][lap] for record in records)
+            for lap in ("build", "write", "load", "render")
+        },
+        "median_error": float(table["median_error"].median()) if len(table) else None,
+        "splits": {split: int((table["split"] == split).sum()) for split in recipe.splits},
+    }
+    if totals["median_error"] != totals["median_error"]:  # no frame has samples enough for an error
+        totals["median_error"] = None
+    return {
+        **manifest,
+        "complete": len(records) + len(rejected) >= recipe.rooms,
+        "rejected_rooms": rejected,
+        "rejections": dict(sorted(rejections.items())),
+        "totals": totals,
+    }, table
+
+
+def frame_table(records: Iterable[Mapping[str, Any]], recipe: Recipe) -> pd.DataFrame:
+    """Return a row a frame, in the order of rooms and views.
+
+    Columns: room, view, split, kind, file (from the dataset's folder), sha256, bytes, width, height,
+    camera_x … z and target_x … z (m), fov (horizontal, rad), path, step, exposure (for display), largest
+    (value of color), spp, paths, invalid_paths (counted as 0), median_error (relative standard error of
+    color, before denoising), kernel_seconds, denoise_seconds, seconds (all of the renderer's time), seed.
+    """
+    import pandas as pd
+
+    rows = [
+        {
+            "room": record["room"],
+            "view": frame["view"],
+            "split": record["split"],
+            "kind": record["kind"],
+            "file": f"rooms/{record['room']:06d}/{frame['file']}",
+            "sha256": frame["sha256"],
+            "bytes": frame["bytes"],
+            "width": recipe.resolution[0],
+            "height": recipe.resolution[1],
+            **{f"camera_{axis}": value for axis, value in zip("xyz", frame["camera"], strict=True)},
+            **{f"target_{axis}": value for axis, value in zip("xyz", frame["target"], strict=True)},
+            "fov": frame["fov"],
+            "path": frame["path"],
+            "step": frame["step"],
+            "exposure": frame["exposure"],
+            "largest": frame["largest"],
+            "spp": frame["spp"],
+            "paths": frame["paths"],
+            "invalid_paths": frame["invalid_paths"],
+            "median_error": frame["median_error"],
+            "kernel_seconds": frame["kernel_seconds"],
+            "denoise_seconds": frame["denoise_seconds"],
+            "seconds": frame["seconds"],
+            "seed": frame["seed"],
+        }
+        for record in records
+        for frame in record["frames"]
+    ]
+    return pd.DataFrame(rows, columns=list(COLUMNS)).astype(COLUMNS)
+
+
+#: Columns of `frames.parquet` and their types.
+COLUMNS = {
+    "room": "int64",
+    "view": "int64",
+    "split": "str",
+    "kind": "str",
+    "file": "str",
+    "sha256": "str",
+    "bytes": "int64",
+    "width": "int64",
+    "height": "int64",
+    **{f"{what}_{axis}": "float64" for what in ("camera", "target") for axis in "xyz"},
+    "fov": "float64",
+    "path": "str",
+    "step": "int64",
+    "exposure": "float64",
+    "largest": "float64",
+    "spp": "int64",
+    "paths": "int64",
+    "invalid_paths": "int64",
+    "median_error": "float64",
+    "kernel_seconds": "float64",
+    "denoise_seconds": "float64",
+    "seconds": "float64",
+    "seed": "int64",
+}
+
+
+def write_manifest(root: Path, manifest: Mapping[str, Any]) -> None:
+    """Write `dataset.json`."""
+    write_whole(root / MANIFEST, as_json(manifest))
+
+
+def write_table(root: Path, table: pd.DataFrame) -> None:
+    """Write `frames.parquet`."""
+    content = io.BytesIO()
+    table.to_parquet(content, index=False)
+    write_whole(root / TABLE, content.getvalue())

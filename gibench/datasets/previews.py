@@ -1,0 +1,106 @@
+"""Pictures of a dataset for people: a contact sheet, and one frame with all its channels."""
+
+from __future__ import annotations
+
+import io
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+from gibench.datasets.channel_pictures import Picture, picture_of
+from gibench.datasets.exr import decode
+from gibench.datasets.files import write_whole
+from gibench.rendering.channels import CHANNELS
+from gibench.rendering.tonemap import auto_exposure, display
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from gibench.datasets.loading import Frame
+
+#: Most frames on a contact sheet, and the width of one of them in pixels.
+SHEET_FRAMES, SHEET_WIDTH = 40, 240
+
+#: Least width of a channel in a panel: smaller frames are enlarged by whole factors.
+PANEL_WIDTH = 256
+
+_BACKGROUND, _INK, _FAINT = (24, 24, 24), (235, 235, 235), (160, 160, 160)
+
+
+def contact_sheet(root: Path, table: pd.DataFrame) -> Image.Image:
+    """Lay out up to `SHEET_FRAMES` frames of a dataset, of as many rooms as can be, each exposed by itself.
+
+    table: as in `frames.parquet`, at least one row. A dataset without `color` shows its first channel.
+    """
+    chosen = table.sort_values(["view", "room"]).head(SHEET_FRAMES).sort_values(["room", "view"])
+    tiles = []
+    for row in chosen.to_dict("records"):
+        picture = _thumbnail(root / str(row["file"]))
+        tiles.append((picture, f"room {row['room']}  view {row['view']}", str(row["kind"])))
+    width, height = tiles[0][0].size
+    # As near to a 3:2 sheet as whole columns allow.
+    return _grid(tiles, columns=max(1, round(math.sqrt(len(tiles) * 1.5 * height / width))))
+
+
+def frame_panel(frame: Frame) -> Image.Image:
+    """Show one frame with all its channels, each with its name and the meaning of its colours."""
+    arrays = frame.read()
+    exposure = auto_exposure(arrays["color"]) if "color" in arrays else 1.0
+    tiles = []
+    for name, values in arrays.items():
+        picture, legend = picture_of(CHANNELS[name], values, exposure)
+        tiles.append((_enlarged(picture), name, legend))
+    return _grid(tiles, columns=min(len(tiles), 6))
+
+
+def write_picture(path: Path, picture: Image.Image) -> None:
+    """Write a PNG that appears only when whole."""
+    content = io.BytesIO()
+    picture.save(content, "png", optimize=True)
+    write_whole(path, content.getvalue())
+
+
+def _thumbnail(path: Path) -> Image.Image:
+    arrays = decode(path, widen=True)
+    name = "color" if "color" in arrays else next(iter(arrays))
+    values = arrays[name]
+    if name == "color":
+        picture: Picture = display(values, auto_exposure(values))
+    else:
+        picture, _ = picture_of(CHANNELS[name], values, 1.0)
+    image = _image(picture)
+    height = max(1, round(SHEET_WIDTH * image.height / image.width))
+    sampling = Image.Resampling.LANCZOS if image.width > SHEET_WIDTH else Image.Resampling.NEAREST
+    return image.resize((SHEET_WIDTH, height), sampling)
+
+
+def _image(picture: NDArray[Any]) -> Image.Image:
+    return Image.fromarray(np.rint(255 * np.clip(picture, 0, 1)).astype(np.uint8), "RGB")
+
+
+def _enlarged(picture: Picture) -> Image.Image:
+    image = _image(picture)
+    factor = max(1, math.ceil(PANEL_WIDTH / image.width))
+    return image.resize((image.width * factor, image.height * factor), Image.Resampling.NEAREST)
+
+
+def _grid(tiles: list[tuple[Image.Image, str, str]], columns: int) -> Image.Image:
+    """Tiles in reading order, each under its title (left) and a remark (right); all tiles have one size."""
+    width, height = tiles[0][0].size
+    gap, size = 6, 13
+    line = size + 7
+    rows = math.ceil(len(tiles) / columns)
+    sheet = Image.new("RGB", (gap + columns * (width + gap), gap + rows * (height + line + gap)), _BACKGROUND)
+    draw, font = ImageDraw.Draw(sheet), ImageFont.load_default(size)
+    for i, (image, title, remark) in enumerate(tiles):
+        x, y = gap + i % columns * (width + gap), gap + i // columns * (height + line + gap)
+        draw.text((x + 2, y + line / 2), title, _INK, font, anchor="lm")
+        left = width - draw.textlength(title, font) - 12
+        if draw.textlength(remark, font) <= left:
+            draw.text((x + width - 2, y + line / 2), remark, _FAINT, font, anchor="rm")
+        sheet.paste(image, (x, y + line))
+    return sheet

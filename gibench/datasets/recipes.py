@@ -1,0 +1,213 @@
+"""Recipes: what a dataset is made of, as TOML files that are checked before anything is made."""
+
+from __future__ import annotations
+
+import hashlib
+import tomllib
+from collections.abc import Mapping
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic_core import PydanticCustomError
+
+from gibench.datasets.errors import RecipeError, nearest
+from gibench.rendering import channels as contract
+
+#: Environments that are no file: what `sample_room` would choose itself, sun and sky, or darkness outside.
+ENVIRONMENTS = ("auto", "sunsky", "none")
+
+#: Options of the commands whose name is not the key that they override.
+OPTIONS = {"kinds": "--kind"}
+
+# Lists in TOML become tuples here: a recipe is a value that can be compared and hashed.
+Names = Annotated[tuple[str, ...], Field(strict=False, min_length=1)]
+
+
+class Recipe(BaseModel):
+    """Everything that decides the pixels of a dataset, apart from the versions and the variant.
+
+    Recipes compare equal when they make the same frames. The defaults are those of the preset `small`.
+    """
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+    rooms: int = Field(10, ge=1, le=10**6, description="an integer from 1 to 1000000")
+    seed: int = Field(0, ge=0, lt=2**63, description="an integer from 0 to 2⁶³−1")
+    kinds: Names = Field(("all",), validate_default=True, description='a list of room kinds, or ["all"]')
+    views: int = Field(4, ge=1, le=9999, description="an integer from 1 to 9999 (frames a room)")
+    resolution: Annotated[
+        tuple[Annotated[int, Field(ge=8, le=16384)], Annotated[int, Field(ge=8, le=16384)]],
+        Field(strict=False),
+    ] = Field((256, 192), description="two integers [width, height], each from 8 to 16384")
+    spp: int | None = Field(
+        None,
+        ge=1,
+        le=2**20,
+        description="an integer from 1 to 1048576 (samples a pixel), or error in its place",
+    )
+    error: float | None = Field(
+        None, gt=0, lt=1, description="a number between 0 and 1 (median relative error), or spp in its place"
+    )
+    spp_cap: int = Field(
+        4096, ge=1, le=2**20, description="an integer from 1 to 1048576 (most samples for error)"
+    )
+    max_depth: int = Field(8, ge=1, le=1000, description="an integer from 1 to 1000 (scattering events)")
+    denoise: bool = Field(True, description="true or false")
+    channels: Names = Field(
+        ("radiance", "surface"), validate_default=True, description="a list of channels or sets of channels"
+    )
+    environment: str = Field(
+        "auto", description='"auto", "sunsky", "none" or the path of an equirectangular .hdr or .exr file'
+    )
+    path: Literal["stills", "walk", "orbit", "eight"] = Field(
+        "stills", description='"stills", "walk", "orbit" or "eight" (the frames of a room lie on that path)'
+    )
+    splits: dict[str, float] = Field(
+        {"train": 0.8, "validation": 0.1, "test": 0.1},
+        description="a table of names and shares from 0 to 1 that sum to 1",
+    )
+    licence: str = Field("CC0-1.0", min_length=1, description="the SPDX name of the licence of the data")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _default_samples(cls, values: Any) -> Any:
+        """Take 64 samples where the recipe sets neither `spp` nor `error`."""
+        if isinstance(values, dict) and values.get("spp") is None and values.get("error") is None:
+            return {**values, "spp": 64}
+        return values
+
+    @model_validator(mode="after")
+    def _one_way_to_stop(self) -> Self:
+        if self.spp is not None and self.error is not None:
+            raise PydanticCustomError("both", "spp and error are both set; keep one of them")
+        return self
+
+    @field_validator("kinds")
+    @classmethod
+    def _known_kinds(cls, kinds: tuple[str, ...]) -> tuple[str, ...]:
+        from gibench.generators.rooms import KINDS  # not needed by those who only read datasets
+
+        for kind in kinds:
+            if kind not in (*KINDS, "all"):
+                text = f"no kind '{kind}'; {nearest(kind, KINDS)}"
+                raise PydanticCustomError("unknown", "{text}", {"text": text})
+        return tuple(kind for kind in KINDS if kind in kinds or "all" in kinds)
+
+    @field_validator("channels")
+    @classmethod
+    def _known_channels(cls, channels: tuple[str, ...]) -> tuple[str, ...]:
+        try:
+            return contract.resolve(channels)
+        except contract.UnknownChannelError as problem:
+            raise PydanticCustomError("unknown", "{text}", {"text": str(problem)}) from None
+
+    @field_validator("splits")
+    @classmethod
+    def _whole_splits(cls, splits: dict[str, float]) -> dict[str, float]:
+        if not splits or min(splits.values()) < 0 or abs(sum(splits.values()) - 1.0) > 1e-6:
+            raise PydanticCustomError("splits", "the shares do not sum to 1")
+        return splits
+
+    def identity(self) -> dict[str, Any]:
+        """Return the recipe as JSON-able values without the number of rooms, which alone may grow.
+
+        An environment file counts by its content (SHA-256), not by where it lies. Raises `RecipeError` when
+        it cannot be read.
+        """
+        values = self.model_dump(mode="json", exclude={"rooms"})
+        if self.environment not in ENVIRONMENTS:
+            values["environment"] = f"sha256:{file_sha256(Path(self.environment))}"
+        return values
+
+
+def file_sha256(path: Path) -> str:
+    """SHA-256 of an environment file, hexadecimal. Raises `RecipeError` when it cannot be read."""
+    try:
+        with open(path, "rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as problem:
+        raise RecipeError(f"environment file {path} cannot be read: {problem.strerror}") from None
+
+
+def preset_names() -> tuple[str, ...]:
+    """Names of the recipes that ship with gibench."""
+    folder = resources.files("gibench.datasets") / "presets"
+    return tuple(sorted(f.name.removesuffix(".toml") for f in folder.iterdir() if f.name.endswith(".toml")))
+
+
+def load_preset(name: str, overrides: Mapping[str, Any] | None = None) -> Recipe:
+    """Load a recipe that ships with gibench; `overrides` as in `load_recipe`. Raises `RecipeError`."""
+    if name not in preset_names():
+        raise RecipeError(f"no preset '{name}'; {nearest(name, preset_names())}")
+    text = (resources.files("gibench.datasets") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
+    return check_recipe(tomllib.loads(text), source=f"preset {name}", overrides=overrides)
+
+
+def load_recipe(path: Path, overrides: Mapping[str, Any] | None = None) -> Recipe:
+    """Load a recipe from a TOML file; keys that it leaves out take their defaults.
+
+    overrides: option → value, as given on the command line; they win over the file. A relative `environment`
+    path counts from the file's folder. Raises `RecipeError` with the file, the key and what is allowed.
+    """
+    try:
+        values = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as problem:
+        raise RecipeError(f"recipe {path} cannot be read: {problem.strerror}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as problem:
+        raise RecipeError(f"recipe {path} is no valid TOML: {problem}") from None
+    environment = values.get("environment")
+    if isinstance(environment, str) and environment not in ENVIRONMENTS:
+        values["environment"] = str((path.parent / environment).resolve())
+    return check_recipe(values, source=str(path), overrides=overrides)
+
+
+def check_recipe(
+    values: Mapping[str, Any], *, source: str = "recipe", overrides: Mapping[str, Any] | None = None
+) -> Recipe:
+    """Check the keys of a recipe and lay the overrides over them. Raises `RecipeError`.
+
+    source: what the errors call the place where `values` come from.
+    """
+    overrides = dict(overrides or {})
+    recipe = _validated(dict(values), source)
+    if not overrides:
+        return recipe
+    merged = dict(values)
+    # Asking for samples replaces asking for an error, and the other way round.
+    for asked, other in (("spp", "error"), ("error", "spp")):
+        if asked in overrides and other not in overrides:
+            merged.pop(other, None)
+    return _validated(merged | overrides, source, frozenset(overrides))
+
+
+def _validated(values: dict[str, Any], source: str, options: frozenset[str] = frozenset()) -> Recipe:
+    try:
+        recipe = Recipe.model_validate(values)
+    except ValidationError as problems:
+        raise RecipeError(_message(problems, values, source, options)) from None
+    if recipe.environment not in ENVIRONMENTS and not Path(recipe.environment).is_file():
+        near = nearest(recipe.environment, ENVIRONMENTS)
+        raise RecipeError(f"{source}: environment: there is no file {recipe.environment}; {near}")
+    return recipe
+
+
+def _message(
+    problems: ValidationError, values: Mapping[str, Any], source: str, options: frozenset[str]
+) -> str:
+    problem = problems.errors()[0]
+    if not problem["loc"]:
+        if options >= {"spp", "error"}:
+            source = "options"
+        return f"{source}: {problem['msg']}"
+    key = str(problem["loc"][0])
+    if problem["type"] == "extra_forbidden":
+        return f"{source}: unknown key '{key}'; {nearest(key, Recipe.model_fields)}"
+    place = OPTIONS.get(key, f"--{key}") if key in options else f"{source}: {key}"
+    if problem["type"] == "unknown":
+        return f"{place}: {problem['msg']}"
+    reason = f" ({problem['msg']})" if problem["type"] == "splits" else ""
+    return (
+        f"{place}: {values[key]!r} is not allowed{reason}; allowed is {Recipe.model_fields[key].description}"
+    )

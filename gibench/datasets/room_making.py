@@ -1,0 +1,271 @@
+"""One room, from its number to its folder. This is what workers run; only here is anything rendered."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.metadata
+import math
+import os
+import platform
+import shutil
+import time
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import gibench
+from gibench.datasets import exr
+from gibench.datasets.errors import StorageError
+from gibench.datasets.files import as_json, sync_tree
+from gibench.datasets.folder import RECORD, partial_folder, room_folder
+from gibench.datasets.recipes import ENVIRONMENTS, Recipe
+from gibench.datasets.splits import split_of
+from gibench.generators.parts import Camera, Room
+
+if TYPE_CHECKING:
+    from gibench.rendering.render import RenderedFrame
+
+#: Lane of the random numbers that rendering draws; far above those that the generators spawn for a room.
+RENDER_LANE = 1000
+
+#: Other packages whose version decides what the pixels are, beside those that the renderer names itself.
+GENERATING = ("numpy", "scipy", "shapely", "trimesh", "colour-science")
+
+
+@dataclass(frozen=True)
+class Renderer:
+    """Makes a worker ready; the answer says what will make the pixels.
+
+    threads: CPU threads that this worker may use. environment: that of the recipe, whose file is looked through
+    before anything is made.
+    """
+
+    variant: str
+    threads: int
+    environment: str
+
+    def __call__(self) -> dict[str, Any]:
+        """Return `variant`, `versions` and `gpu`. Raises `BackendError`, `BadEnvironment`."""
+        from gibench.generators.daylight import hdr
+        from gibench.rendering import backend
+
+        variant = backend.select_variant(self.variant)
+        backend.limit_threads(self.threads)
+        if self.environment not in ENVIRONMENTS:
+            hdr(path=self.environment, rotation=0.0, lux=1.0)
+        versions = {"gibench": gibench.__version__}
+        versions |= {name: importlib.metadata.version(name) for name in GENERATING}
+        return {
+            "variant": variant,
+            "versions": versions | backend.versions(),
+            "gpu": backend.find_gpu() if variant.startswith("cuda") else None,
+        }
+
+
+def frame_seed(seed: int, room: int, view: int) -> int:
+    """Seed of a frame's samples: 32 bits that depend on the dataset's seed, the room and the view alone."""
+    return int(np.random.SeedSequence(seed, spawn_key=(room, RENDER_LANE, view)).generate_state(1)[0])
+
+
+def sampled_room(recipe: Recipe, room: int) -> Room:
+    """Build room number `room` of a recipe; nothing is written. Raises `RejectedRoom`."""
+    from gibench.generators.rooms import sample_room
+
+    return sample_room(
+        recipe.seed,
+        room,
+        kinds=recipe.kinds,
+        views=recipe.views,
+        path=None if recipe.path == "stills" else recipe.path,
+        environment=None if recipe.environment == "auto" else recipe.environment,
+    )
+
+
+def rendered_frame(recipe: Recipe, scene: Any, room: Room, view: int, **settings: Any) -> RenderedFrame:
+    """Render one view of a room with a recipe's settings, or with other `settings` of `render_frame`."""
+    from gibench.rendering.camera import PinholeCamera
+    from gibench.rendering.render import render_frame
+
+    def pinhole(camera: Camera) -> PinholeCamera:
+        return PinholeCamera(camera.position, camera.target, camera.fov)
+
+    camera = room.cameras[view]
+    before = room.cameras[view - 1] if view > 0 else None
+    follows = (
+        before is not None and camera.path and (before.path, before.step) == (camera.path, camera.step - 1)
+    )
+    samples = (
+        {"spp": recipe.spp} if recipe.error is None else {"error": recipe.error, "spp_cap": recipe.spp_cap}
+    )
+    return render_frame(
+        scene,
+        pinhole(camera),
+        **{
+            "resolution": recipe.resolution,
+            "channels": recipe.channels,
+            "seed": frame_seed(recipe.seed, room.index, view),
+            "max_depth": recipe.max_depth,
+            "denoise": recipe.denoise,
+            "previous_camera": pinhole(before) if before is not None and follows else None,
+            **samples,
+            **settings,
+        },
+    )
+
+
+@dataclass(frozen=True)
+class RoomMaker:
+    """Makes whole room folders of one dataset; the job that workers are given.
+
+    Returns the room's record, as it lies in `frames.json`, or {"rejected": reason} where no try of the room
+    passed the checks of the generators.
+    """
+
+    root: Path
+    recipe: Recipe
+
+    def __call__(self, room: int, report: Callable[[str, Any], None]) -> dict[str, Any]:
+        """Make room number `room`; reports ("frame", {"paths", "seconds" in kernels}) after each frame."""
+        from gibench.generators.rooms import RejectedRoom
+
+        final = room_folder(self.root, room)
+        partial = partial_folder(self.root, room, os.getpid())
+        partial.mkdir(parents=True)
+        try:
+            record = self._filled(partial, room, report)
+            (partial / RECORD).write_bytes(as_json(record))
+            sync_tree(partial)
+            partial.rename(final)
+        except RejectedRoom as reason:
+            shutil.rmtree(partial)
+            return {"rejected": str(reason)}
+        except BaseException:
+            shutil.rmtree(partial, ignore_errors=True)
+            raise
+        return record
+
+    def _filled(self, folder: Path, number: int, report: Callable[[str, Any], None]) -> dict[str, Any]:
+        from gibench.generators.scene_files import write_room
+        from gibench.rendering.scene import load_scene
+
+        recipe = self.recipe
+        clock = Stopwatch()
+        room = sampled_room(recipe, number)
+        clock.lap("build")
+        write_room(
+            room,
+            folder,
+            # Mitsuba counts segments, of which there is one more than scattering events.
+            max_depth=recipe.max_depth + 1,
+            resolution=recipe.resolution,
+            spp=recipe.spp or recipe.spp_cap,
+        )
+        clock.lap("write")
+        scene = load_scene(folder / "scene.xml")
+        clock.lap("load")
+        files = {
+            str(path.relative_to(folder).as_posix()): _fingerprint(path.read_bytes())
+            for path in sorted(folder.rglob("*"))
+            if path.is_file()
+        }
+        (folder / "frames").mkdir()
+        frames: list[Future[dict[str, Any]]] = []
+        # Compressing and writing a frame goes on while the next one renders. One frame at most waits for it,
+        # so memory does not grow with the number of views.
+        with ThreadPoolExecutor(max_workers=1) as writer:
+            for view in range(len(room.cameras)):
+                rendered = rendered_frame(recipe, scene, room, view)
+                report("frame", {"paths": rendered.paths, "seconds": rendered.kernel_seconds})
+                if frames:
+                    frames[-1].result()
+                frames.append(writer.submit(self._stored, folder, room, view, rendered))
+        records = [frame.result() for frame in frames]
+        clock.lap("render")
+        return {
+            "room": number,
+            "kind": room.kind,
+            "split": split_of(number, recipe.splits),
+            "materials": list(scene.materials),
+            "shapes": list(scene.shapes),
+            "rejections": dict(room.rejections),
+            "seconds": clock.laps,
+            "frames": records,
+            "files": files,
+        }
+
+    def _stored(self, folder: Path, room: Room, view: int, rendered: RenderedFrame) -> dict[str, Any]:
+        from gibench.rendering.tonemap import auto_exposure
+
+        try:
+            content = exr.encode(rendered.arrays)
+        except StorageError as problem:
+            raise StorageError(f"view {view}: {problem}") from None
+        file = f"frames/{view:04d}.exr"
+        (folder / file).write_bytes(content)
+        camera = room.cameras[view]
+        color = rendered.arrays.get("color")
+        return {
+            "view": view,
+            "file": file,
+            **_fingerprint(content),
+            "camera": list(camera.position),
+            "target": list(camera.target),
+            "fov": camera.fov,
+            "path": camera.path,
+            "step": camera.step,
+            "exposure": None if color is None else auto_exposure(color),
+            "largest": None if color is None else float(color.max()),
+            "spp": rendered.spp,
+            "paths": rendered.paths,
+            "invalid_paths": rendered.invalid_paths,
+            "median_error": rendered.median_error if math.isfinite(rendered.median_error) else None,
+            "kernel_seconds": rendered.kernel_seconds,
+            "denoise_seconds": rendered.denoise_seconds,
+            "seconds": rendered.seconds,
+            "seed": frame_seed(self.recipe.seed, room.index, view),
+        }
+
+
+class Stopwatch:
+    """Seconds of wall time between laps, by the lap's name."""
+
+    def __init__(self) -> None:
+        """Start the first lap."""
+        self.laps: dict[str, float] = {}
+        self._last = time.perf_counter()
+
+    def lap(self, name: str) -> None:
+        """End the current lap and call it `name`."""
+        now = time.perf_counter()
+        self.laps[name] = now - self._last
+        self._last = now
+
+
+def machine() -> dict[str, Any]:
+    """What the dataset is made on: operating system, processor, cores, memory (bytes), Python."""
+    import psutil
+
+    return {
+        "platform": platform.platform(),
+        "cpu": _processor(),
+        "cores": psutil.cpu_count(logical=True),
+        "memory": psutil.virtual_memory().total,
+        "python": platform.python_version(),
+    }
+
+
+def _processor() -> str:
+    information = Path("/proc/cpuinfo")
+    if information.is_file():
+        for line in information.read_text(encoding="utf-8", errors="replace").splitlines():
+            if line.startswith("model name"):
+                return line.split(":", 1)[1].strip()
+    return platform.processor() or platform.machine()
+
+
+def _fingerprint(content: bytes) -> dict[str, Any]:
+    return {"sha256": hashlib.sha256(content).hexdigest(), "bytes": len(content)}

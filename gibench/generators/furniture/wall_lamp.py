@@ -1,0 +1,70 @@
+"""Wall lamps: a shade on an arm, or an uplighter."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from gibench.generators.furniture.drawing import Size, checked, draw
+from gibench.generators.furniture.joinery import centred
+from gibench.generators.furniture.lamps import BULB, bulb, shaded_bulb
+from gibench.generators.parts import Furniture, Part
+from gibench.generators.shapes import box, fillet, merge, revolve, rod, translate
+
+SIZES = {"height": Size(0.24, 0.18, 0.32, 0.1), "width": Size(0.18, 0.13, 0.24, 0.1), **BULB}
+CHOICES = {"style": ("shade", "uplight"), "metal": ("metal", "brass", "chrome", "lacquer")}
+
+
+def wall_lamp(
+    *, height: float, width: float, lumens: float, kelvin: float, style: str, metal: str
+) -> Furniture:
+    """A lamp for a wall (m, lm, K). metal: slot of its fittings.
+
+    Raises FurnitureError for a size out of SIZES or an option out of CHOICES.
+    """
+    parameters = checked("wall_lamp", locals(), SIZES, CHOICES)
+    w = width / 2
+    gap = 0.045
+    y = w  # of the shade, in a frame whose wall is at y = -gap
+    if style == "shade":
+        parts, light, joint = shaded_bulb(
+            "empire",
+            width,
+            height,
+            hanging=False,
+            radius=0.03,
+            lumens=lumens,
+            kelvin=kelvin,
+            metal=metal,
+            at=(0.0, y),
+        )
+        low = 0.0
+        plate = box(-0.035, 0.035, -gap, -gap + 0.012, low, low + 0.12, bevel=0.004)
+        bar = [
+            rod([0, -gap + 0.01, 0.05], [0, y, 0.05], 0.006),
+            rod([0, y, 0.044], [0, y, joint + 0.004], 0.007),
+        ]
+    else:
+        r = w
+        line = [[0, 0.0], [0.35 * r, 0.0], [r, height], [r - 0.003, height], [0.33 * r, 0.012], [0, 0.012]]
+        profile = fillet(line, [0, 0.3 * r, 0.001, 0.001, 0.3 * r, 0], segments=6)
+        profile[:, 0] *= r / profile[:, 0].max()
+        bowl = revolve(profile, segments=40)
+        parts = [Part(translate(bowl, [0, y, 0]), metal)]
+        z = 0.62 * height
+        radius = 0.03
+        light = bulb((0.0, y, z), radius, lumens, kelvin)
+        plate = box(-0.035, 0.035, -gap, -gap + 0.012, 0.25 * height, 0.25 * height + 0.1, bevel=0.004)
+        bar = [
+            rod([0, -gap + 0.01, 0.25 * height + 0.05], [0, 0.5 * y, 0.25 * height + 0.05], 0.008),
+            rod([0, y, 0.005], [0, y, z - radius - 0.003], 0.014),
+        ]
+    parts.append(Part(merge([plate, *bar]), metal))
+    moved, lights = centred(parts, [light])
+    return Furniture("wall_lamp", parameters, moved, (), lights, mount="wall")
+
+
+def sample_wall_lamp(rng: np.random.Generator, **fixed: Any) -> Furniture:
+    """A wall lamp with the parameters that are not fixed drawn at random."""
+    return wall_lamp(**(draw(rng, SIZES, CHOICES) | fixed))

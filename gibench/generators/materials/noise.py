@@ -1,0 +1,74 @@
+"""Periodic noise: arrays that continue across their own edges, so that a texture tiles without a seam."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import scipy.fft
+import scipy.special
+from numpy.typing import NDArray
+
+Map = NDArray[np.float32]
+
+
+def band_noise(
+    rng: np.random.Generator,
+    shape: tuple[int, int],
+    cycles: tuple[float, float],
+    *,
+    width: float = 0.7,
+    slope: float = 0.0,
+) -> Map:
+    """Gaussian noise around a spatial frequency, zero mean and unit variance.
+
+    shape: (H, W). cycles: the strongest frequency across the tile along (u, v), that is along columns and
+    rows; unequal numbers give streaks. width: half width of the band, in nepers of frequency. slope:
+    power-law fall-off towards high frequencies added to the band (0 none; 1 makes clouds with detail in
+    them).
+    """
+    amplitude = _filter(shape, cycles, width, slope)
+    spectrum = rng.standard_normal((*amplitude.shape, 2), dtype=np.float32).view(np.complex64)[..., 0]
+    spectrum *= amplitude
+    field = scipy.fft.irfft2(spectrum, s=shape, overwrite_x=True)
+    field /= max(float(field.std()), 1e-12)
+    return field
+
+
+@lru_cache(maxsize=64)
+def _filter(shape: tuple[int, int], cycles: tuple[float, float], width: float, slope: float) -> Map:
+    """Amplitudes over the half plane of frequencies; families ask for the same few again and again."""
+    height, breadth = shape
+    fu = np.arange(breadth // 2 + 1)[None, :] / cycles[0]
+    fv = np.fft.fftfreq(height, 1 / height)[:, None] / cycles[1]
+    radius = np.hypot(fu, fv)
+    radius[0, 0] = 1.0
+    octave = np.log(radius)
+    if slope > 0:
+        amplitude = np.exp(-0.5 * (np.minimum(octave, 0) / width) ** 2 - (slope + 1) * np.maximum(octave, 0))
+    else:
+        # An even density over the plane would crowd the high end of the band: divide by the radius.
+        amplitude = np.exp(-0.5 * (octave / width) ** 2 - octave)
+    amplitude[0, 0] = 0.0
+    return amplitude.astype(np.float32)
+
+
+def uniform(field: Map) -> Map:
+    """Turn zero-mean, unit-variance Gaussian noise into noise spread evenly over [0, 1]."""
+    return scipy.special.ndtr(field).astype(np.float32)
+
+
+def white(rng: np.random.Generator, shape: tuple[int, int]) -> Map:
+    """Independent uniform values in [0, 1), (H, W) float32."""
+    return rng.random(shape, dtype=np.float32)
+
+
+def lookup(field: Map, rows: NDArray[np.integer], columns: NDArray[np.integer]) -> Map:
+    """Values at integer positions that wrap around, broadcast over rows and columns."""
+    return field.ravel()[(rows % field.shape[0]) * field.shape[1] + columns % field.shape[1]]
+
+
+def smoothstep(low: float, high: float, values: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Cubic step from 0 at low to 1 at high."""
+    t = np.clip((values - low) / (high - low), 0, 1)
+    return t * t * (3 - 2 * t)

@@ -1,0 +1,257 @@
+"""A room from a seed: shell, furniture, materials, lights and cameras, tried until all of it holds together."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from gibench.errors import GibenchError
+from gibench.generators.cameras import PATHS, NoView, Stage, sample_path, sample_stills
+from gibench.generators.daylight import sample_daylight
+from gibench.generators.grid_solid import box
+from gibench.generators.layouts import FURNISH
+from gibench.generators.layouts.placement import Plan, RejectedRoom
+from gibench.generators.light_shapes import placed_light
+from gibench.generators.lighting import light_room
+from gibench.generators.materials import is_glossy
+from gibench.generators.outside import GROUND, ground_material
+from gibench.generators.palette import Palette
+from gibench.generators.parts import Environment, FloatArray, Mesh, Part, Room, RoomObject
+from gibench.generators.poses import stand
+from gibench.generators.shapes import merge
+from gibench.generators.shell_sampling import sample_shell
+from gibench.generators.visibility import RayCaster
+
+KINDS = tuple(FURNISH)
+LANES = ("kind", "shell", "layout", "materials", "lights", "cameras", "environment")
+TRIES = 12  # of one room before it is given up
+LEAST_FREE = 0.8  # floor that cameras may stand on, m²
+LEAST_THINGS = 14  # pieces of furniture, lamps and small things included
+SMALL = 0.6  # longest side of what counts as a small thing, m
+GLOSSY_SHARE = 0.5  # share of rooms that are given a polished surface on purpose
+GLOSSY_AREA = 0.5  # least area of a surface that counts as large, m²
+LARGE = frozenset(
+    {"floor", "wall", "dining_table", "desk", "coffee_table", "wardrobe", "dresser", "tv_stand"}
+) | {
+    "kitchen_counter",
+    "splashback",
+    "fridge",
+    "bathtub",
+    "mirror",
+    "tv",
+}  # families with surfaces in one piece
+
+
+class UnknownKind(GibenchError):
+    """A room kind or a kind of camera path that does not exist."""
+
+
+def sample_room(
+    seed: int,
+    index: int,
+    *,
+    kind: str | None = None,
+    kinds: Sequence[str] = KINDS,
+    views: int = 4,
+    path: str | None = None,
+    environment: Environment | str | None = None,
+    **fixed: Any,
+) -> Room:
+    """Draw room number `index` of the run `seed`; it depends on these two and on the options alone.
+
+    kind: of the room; drawn from `kinds` if None. views: number of cameras. path: None for stills, or "walk",
+    "orbit" or "eight" for one path of that many frames. environment: what lies outside: "none", "sunsky", the path
+    of an HDR panorama, or an Environment; drawn if None.
+    fixed: arguments of `build_shell` that are not drawn, such as width=4.0.
+
+    A try that fails is counted in `Room.rejections` by its reason and drawn again. Raises RejectedRoom when all
+    tries have failed, UnknownKind for a kind or path that does not exist.
+    """
+    for name in kinds if kind is None else (kind,):
+        if name not in FURNISH:
+            raise UnknownKind(f"there is no room kind {name!r}; choose from {', '.join(KINDS)}")
+    if path is not None and path not in PATHS:
+        raise UnknownKind(f"there is no camera path {path!r}; choose from {', '.join(PATHS)}")
+    rejections: Counter[str] = Counter()
+    if kind is None:
+        kind = kinds[int(_lane(seed, index, "kind", 0).integers(len(kinds)))]
+    for attempt in range(TRIES):
+        try:
+            room = _try_room(seed, index, attempt, kind, views, path, environment, fixed, rejections)
+        except RejectedRoom as refusal:
+            rejections[refusal.reason] += 1
+        except NoView as refusal:
+            rejections.update({f"view: {reason}": count for reason, count in refusal.reasons.items()})
+            rejections[f"no {refusal.what}"] += 1
+        else:
+            return room
+    worst = ", ".join(f"{reason} {count}" for reason, count in rejections.most_common(3))
+    raise RejectedRoom(
+        f"room {index} of seed {seed} ({kind}) failed {TRIES} times ({worst})",
+        "leave out fixed sizes, or skip this index",
+    )
+
+
+def _lane_seed(seed: int, index: int, lane: str, attempt: int) -> np.random.SeedSequence:
+    return np.random.SeedSequence(seed, spawn_key=(index, LANES.index(lane), attempt))
+
+
+def _lane(seed: int, index: int, lane: str, attempt: int) -> np.random.Generator:
+    return np.random.default_rng(_lane_seed(seed, index, lane, attempt))
+
+
+def _try_room(
+    seed: int,
+    index: int,
+    attempt: int,
+    kind: str,
+    views: int,
+    path: str | None,
+    environment: Environment | str | None,
+    fixed: Mapping[str, Any],
+    rejections: Counter[str],
+) -> Room:
+    def lane(name: str) -> np.random.Generator:
+        return _lane(seed, index, name, attempt)
+
+    shell = sample_shell(lane("shell"), kind, **fixed)
+    plan = Plan(shell, kind, lane("layout"))
+    FURNISH[kind](plan)
+    light_room(lane("lights"), plan)
+    if len(plan.placed) < LEAST_THINGS:
+        raise RejectedRoom("few things")
+    free = plan.free_floor()
+    if free.area < LEAST_FREE:
+        raise RejectedRoom("no free floor")
+
+    palette = Palette(_lane_seed(seed, index, "materials", attempt), kind)
+    _polish_something(palette, plan)
+    objects = _objects(plan, palette)
+
+    stage = Stage(free, shell.height, _middles(plan), _caster(objects), len(shell.pieces))
+    if path is None:
+        cameras, refused = sample_stills(lane("cameras"), stage, views)
+    else:
+        cameras, refused = sample_path(lane("cameras"), stage, path, views)
+    rejections.update({f"view: {reason}": count for reason, count in refused.items()})
+
+    lights = tuple(
+        placed_light(light, p.name, p.position, p.yaw) for p in plan.placed for light in p.furniture.lights
+    )
+    if isinstance(environment, str):
+        kind_outside, panorama = (
+            (environment, None) if environment in ("none", "sunsky") else ("hdr", environment)
+        )
+        environment = sample_daylight(lane("environment"), kind=kind_outside, path=panorama)
+    elif environment is None:
+        environment = sample_daylight(lane("environment"))
+    materials = dict(palette.materials)
+    if environment.kind == "sunsky":
+        materials[GROUND] = ground_material(environment)
+    parameters = {
+        "shell": dict(shell.parameters),
+        "attempt": attempt,
+        "glossy": _large_glossy(objects, palette),
+    }
+    return Room(
+        seed,
+        index,
+        kind,
+        parameters,
+        objects,
+        lights,
+        environment,
+        materials,
+        cameras,
+        dict(rejections),
+    )
+
+
+def _caster(objects: Sequence[RoomObject]) -> RayCaster:
+    """Rays against everything in the room; the owner of a hit is the number of the object.
+
+    Small things are boxes here: they hold half of a room's triangles, and the grid of rays is coarser than they are.
+    """
+    meshes: list[Mesh] = []
+    owners: list[int] = []
+    for number, thing in enumerate(objects):
+        own = [mesh for mesh, _ in thing.shapes]
+        low = np.min([mesh.vertices.min(0) for mesh in own], 0)
+        high = np.max([mesh.vertices.max(0) for mesh in own], 0)
+        if (high - low).max() < SMALL:
+            own = [box(low, high)]
+        meshes += own
+        owners += [number] * len(own)
+    return RayCaster(meshes, owners)
+
+
+def _middles(plan: Plan) -> FloatArray:
+    """(N, 3) middles of the furniture, which is what cameras look at."""
+    return np.array([[*p.position[:2], (p.boxes[:, 5].min() + p.boxes[:, 6].max()) / 2] for p in plan.placed])
+
+
+def _polish_something(palette: Palette, plan: Plan) -> None:
+    """Half the rooms get one large surface that shows reflections."""
+    rng = palette.rng("polish")
+    wanted, favourite = rng.random() < GLOSSY_SHARE, rng.random()
+    if not wanted:
+        return
+    choices = [("floor", "floor")]
+    for thing in plan.placed:
+        slots = {part.slot for part in thing.furniture.parts}
+        if thing.furniture.family in LARGE:
+            choices += [
+                (thing.furniture.family, slot) for slot in ("wood", "lacquer", "stone") if slot in slots
+            ]
+    # The floor is the largest mirror of a room, and the most common one.
+    choice = 0 if favourite < 0.5 else int(rng.integers(len(choices)))
+    palette.polish(*choices[choice])
+
+
+def _objects(plan: Plan, palette: Palette) -> tuple[RoomObject, ...]:
+    objects = []
+    for piece in plan.shell.pieces:
+        shapes = _shapes(piece.name, piece.family, piece.parts, palette, (0.0, 0.0, 0.0), 0.0)
+        objects.append(RoomObject(piece.name, piece.family, {}, (0.0, 0.0, 0.0), 0.0, shapes))
+    for thing in plan.placed:
+        family, parts = thing.furniture.family, thing.furniture.parts
+        shapes = _shapes(thing.name, family, parts, palette, thing.position, thing.yaw)
+        parameters = thing.furniture.parameters
+        objects.append(RoomObject(thing.name, family, parameters, thing.position, thing.yaw, shapes))
+    return tuple(objects)
+
+
+def _shapes(
+    name: str,
+    family: str,
+    parts: Sequence[Part],
+    palette: Palette,
+    position: tuple[float, float, float],
+    yaw: float,
+) -> tuple[tuple[Mesh, str], ...]:
+    """Parts in the world, those of one material joined."""
+    by_material: dict[str, list[Mesh]] = {}
+    for part in parts:
+        material = palette.name_of(name, family, part.slot, part.variant)
+        by_material.setdefault(material, []).append(part.mesh)
+    return tuple((stand(merge(meshes), position, yaw), material) for material, meshes in by_material.items())
+
+
+def _large_glossy(objects: Sequence[RoomObject], palette: Palette) -> list[str]:
+    """Names of the things that show reflections over more than GLOSSY_AREA."""
+    names = []
+    for thing in objects:
+        if thing.family not in LARGE:
+            continue
+        area = 0.0
+        for mesh, material in thing.shapes:
+            if is_glossy(palette.materials[material]):
+                corners = mesh.vertices[mesh.faces]
+                sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+                area += float(np.linalg.norm(sides, axis=1).sum()) / 2
+        if area > GLOSSY_AREA:
+            names.append(thing.name)
+    return names

@@ -1,0 +1,216 @@
+"""A room on disk: scene.xml with its meshes and textures, room.glb and room.json.
+
+Stock Mitsuba renders scene.xml without this package, and the renderer here reads the same file, so what is
+published is what was rendered.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
+
+import numpy as np
+from PIL import Image
+
+from gibench.generators.daylight import environment_xml
+from gibench.generators.glb import write_glb
+from gibench.generators.light import radiance_of
+from gibench.generators.light_shapes import LAMP_MATERIAL, light_matrix
+from gibench.generators.materials import bsdf_xml, tile_size
+from gibench.generators.outside import GROUND, ground_element
+from gibench.generators.parts import Camera, Light, Mesh, Room, Texture
+
+
+def write_room(
+    room: Room,
+    folder: str | Path,
+    *,
+    max_depth: int = 9,
+    resolution: tuple[int, int] = (256, 192),
+    spp: int = 64,
+) -> None:
+    """Write a room into a folder, which is made if it does not exist.
+
+    scene.xml, meshes/*.ply, textures/*.png, room.glb and room.json. Equal rooms give equal files.
+    max_depth (Mitsuba's: 1 shows lamps alone, 2 direct light), resolution (width, height) and spp are those of
+    the integrator, films and samplers in scene.xml.
+    """
+    folder = Path(folder)
+    (folder / "meshes").mkdir(parents=True, exist_ok=True)
+    (folder / "textures").mkdir(exist_ok=True)
+    for thing in room.objects:
+        for number, (mesh, material) in enumerate(thing.shapes):
+            tile = tile_size(room.materials[material])
+            write_ply(mesh, folder / "meshes" / f"{thing.name}.{number}.ply", tile=tile)
+    for surface in room.materials.values():
+        if isinstance(surface.reflectance, Texture):
+            image = Image.fromarray(surface.reflectance.pixels)
+            image.save(folder / "textures" / f"{surface.name}.png", compress_level=2)
+    scene = scene_element(room, max_depth=max_depth, resolution=resolution, spp=spp)
+    indent(scene, "  ")
+    ElementTree(scene).write(folder / "scene.xml", encoding="utf-8", xml_declaration=True)
+    write_glb(room, folder)
+    text = json.dumps(describe(room), indent=1, allow_nan=False)
+    (folder / "room.json").write_text(text + "\n", encoding="utf-8")
+
+
+def write_ply(mesh: Mesh, path: Path, *, tile: tuple[float, float] = (1.0, 1.0)) -> None:
+    """Write a mesh as binary little-endian PLY with float32 positions, normals and UVs.
+
+    tile: metres that the texture's tile covers; UVs are divided by it. Scaling them here rather than by a transform
+    of each texture keeps materials alike, so that Dr.Jit compiles one kernel for them all, and for the next room.
+    """
+    fields = ("x", "y", "z", "nx", "ny", "nz", "u", "v")
+    lines = [
+        "ply",
+        "format binary_little_endian 1.0",
+        f"element vertex {len(mesh.vertices)}",
+        *(f"property float {name}" for name in fields),
+        f"element face {len(mesh.faces)}",
+        "property list uchar int vertex_indices",
+        "end_header\n",
+    ]
+    faces = np.empty(len(mesh.faces), dtype=[("count", "u1"), ("corners", "<i4", 3)])
+    faces["count"], faces["corners"] = 3, mesh.faces
+    vertices = np.concatenate(
+        [mesh.vertices, mesh.normals, mesh.uvs / tile], 1, dtype="<f4", casting="same_kind"
+    )
+    path.write_bytes("\n".join(lines).encode("ascii") + vertices.tobytes() + faces.tobytes())
+
+
+def scene_element(room: Room, *, max_depth: int, resolution: tuple[int, int], spp: int) -> Element:
+    """The `<scene>` of a room, with file names relative to its folder; see `write_room`."""
+    scene = Element("scene", version="3.0.0")
+    integrator = SubElement(scene, "integrator", type="path")
+    SubElement(integrator, "integer", name="max_depth", value=str(max_depth))
+    for number, camera in enumerate(room.cameras):
+        scene.append(_sensor(camera, f"camera.{number}", resolution, spp))
+    for material in room.materials.values():
+        textured = isinstance(material.reflectance, Texture)
+        scene.append(bsdf_xml(material, f"textures/{material.name}.png" if textured else None))
+    for thing in room.objects:
+        for number, (_mesh, material_name) in enumerate(thing.shapes):
+            shape = SubElement(scene, "shape", type="ply", id=f"{thing.name}.{number}")
+            SubElement(shape, "string", name="filename", value=f"meshes/{thing.name}.{number}.ply")
+            SubElement(shape, "ref", id=material_name)
+    for light in room.lights:
+        scene.append(_emitter(light))
+    outside = environment_xml(room.environment)
+    if outside is not None:
+        # Lamps outnumber the sky, which would leave it few samples; half of them suit both.
+        SubElement(outside, "float", name="sampling_weight", value=str(max(1, len(room.lights))))
+        scene.append(outside)
+    if GROUND in room.materials:
+        scene.append(ground_element())
+    return scene
+
+
+def _number(value: float) -> str:
+    return repr(float(value))
+
+
+def _sensor(camera: Camera, name: str, resolution: tuple[int, int], spp: int) -> Element:
+    sensor = Element("sensor", type="perspective", id=name)
+    SubElement(sensor, "string", name="fov_axis", value="x")
+    SubElement(sensor, "float", name="fov", value=_number(np.degrees(camera.fov)))
+    SubElement(sensor, "float", name="near_clip", value="0.01")
+    transform = SubElement(sensor, "transform", name="to_world")
+    position, target = (", ".join(_number(c) for c in p) for p in (camera.position, camera.target))
+    SubElement(transform, "lookat", origin=position, target=target, up="0, 0, 1")
+    film = SubElement(sensor, "film", type="hdrfilm")
+    SubElement(film, "integer", name="width", value=str(resolution[0]))
+    SubElement(film, "integer", name="height", value=str(resolution[1]))
+    SubElement(film, "string", name="pixel_format", value="rgb")
+    SubElement(film, "string", name="component_format", value="float32")
+    SubElement(film, "rfilter", type="box")
+    # Mitsuba's stratified samplers are biased for small sample counts.
+    sampler = SubElement(sensor, "sampler", type="independent")
+    SubElement(sampler, "integer", name="sample_count", value=str(spp))
+    return sensor
+
+
+def _emitter(light: Light) -> Element:
+    shape = Element("shape", type=light.shape, id=light.name)
+    if light.shape == "sphere":
+        x, y, z = (_number(c) for c in light.centre)
+        SubElement(shape, "point", name="center", x=x, y=y, z=z)
+        SubElement(shape, "float", name="radius", value=_number(light.size[0]))
+    else:
+        transform = SubElement(shape, "transform", name="to_world")
+        values = " ".join(_number(v) for v in light_matrix(light).ravel())
+        SubElement(transform, "matrix", value=values)
+    SubElement(shape, "ref", id=LAMP_MATERIAL)
+    emitter = SubElement(shape, "emitter", type="area")
+    SubElement(emitter, "rgb", name="radiance", value=" ".join(_number(c) for c in radiance_of(light)))
+    return shape
+
+
+def describe(room: Room) -> dict[str, Any]:
+    """What room.json holds: everything but meshes and pixels, JSON-able, in a fixed order."""
+    return {
+        "seed": room.seed,
+        "index": room.index,
+        "kind": room.kind,
+        "parameters": _plain(room.parameters),
+        "objects": [
+            {
+                "name": thing.name,
+                "family": thing.family,
+                "parameters": _plain(thing.parameters),
+                "position": _plain(thing.position),
+                "yaw": float(thing.yaw),
+                "materials": [material for _, material in thing.shapes],
+            }
+            for thing in room.objects
+        ],
+        "lights": [
+            {
+                "name": light.name,
+                "shape": light.shape,
+                "size": _plain(light.size),
+                "centre": _plain(light.centre),
+                "direction": _plain(light.direction),
+                "lumens": float(light.lumens),
+                "kelvin": float(light.kelvin),
+            }
+            for light in room.lights
+        ],
+        "environment": {"kind": room.environment.kind, "parameters": _plain(room.environment.parameters)},
+        "materials": {
+            name: {
+                "family": material.family,
+                "bsdf": material.bsdf,
+                "alpha": float(material.alpha),
+                "ior": float(material.ior),
+                "conductor": material.conductor,
+                "parameters": _plain(material.parameters),
+            }
+            for name, material in room.materials.items()
+        },
+        "cameras": [
+            {
+                "position": _plain(camera.position),
+                "target": _plain(camera.target),
+                "fov": float(camera.fov),
+                "path": camera.path,
+                "step": int(camera.step),
+            }
+            for camera in room.cameras
+        ],
+        "rejections": dict(sorted(room.rejections.items())),
+    }
+
+
+def _plain(value: Any) -> Any:
+    """NumPy scalars, arrays, tuples and mappings as the types that JSON knows."""
+    if isinstance(value, dict) or hasattr(value, "items"):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, (list, tuple)):
+        return [_plain(v) for v in value]
+    if isinstance(value, np.generic):
+        return value.item()
+    return value

@@ -1,0 +1,88 @@
+"""Whether a view is worth rendering, judged by a coarse grid of rays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gibench.generators.parts import Camera, FloatArray
+from gibench.generators.visibility import RayCaster
+
+GRID = (24, 18)  # rays across and down, at the aspect of the usual 4:3 frame
+
+NEAREST = 0.5  # least distance to anything seen, m
+MEAN_DEPTH = (1.2, 12.0)  # bounds of the mean distance, m
+DEPTH_SPREAD = 0.15  # least standard deviation of the distance, relative to its mean
+OBJECTS = 5  # least number of things seen, walls, floor and the rest of the shell apart
+LARGEST_SHARE = 0.5  # most that one surface may take of the view
+OUTSIDE_SHARE = 0.35  # most of the view that may leave through windows
+
+
+@dataclass(frozen=True)
+class View:
+    """What a candidate sees. reason: why it is refused, empty if it is not. objects: how many things it sees."""
+
+    camera: Camera
+    reason: str
+    objects: int
+    seen: frozenset[int]
+
+
+def camera_rays(camera: Camera, grid: tuple[int, int] = GRID) -> FloatArray:
+    """(columns · rows, 3) unit directions through the centres of a grid over the view, row by row from the top."""
+    forward = np.subtract(camera.target, camera.position)
+    forward /= np.linalg.norm(forward)
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    up = np.cross(right, forward)
+    columns, rows = grid
+    reach = np.tan(camera.fov / 2)
+    x = ((np.arange(columns) + 0.5) / columns * 2 - 1) * reach
+    y = (1 - (np.arange(rows) + 0.5) / rows * 2) * reach * rows / columns
+    rays = forward + y[:, None, None] * up + x[None, :, None] * right
+    rays = rays.reshape(-1, 3)
+    return rays / np.linalg.norm(rays, axis=1, keepdims=True)
+
+
+def judge(caster: RayCaster, cameras: Sequence[Camera], shell_owners: int) -> list[View]:
+    """Cast the grids of all candidates at once and judge each.
+
+    shell_owners: owners below this number are the shell's and do not count as things seen.
+    """
+    rays = [camera_rays(camera) for camera in cameras]
+    count = len(rays[0])
+    origins = np.repeat([camera.position for camera in cameras], count, axis=0)
+    distance, owner = caster.cast(origins, np.concatenate(rays))
+    shape = (len(cameras), count)
+    return [
+        _judge_one(camera, d, o, shell_owners)
+        for camera, d, o in zip(cameras, distance.reshape(shape), owner.reshape(shape), strict=True)
+    ]
+
+
+def _judge_one(
+    camera: Camera, distance: NDArray[np.float32], owner: NDArray[np.int64], shell_owners: int
+) -> View:
+    hit = owner >= 0
+    seen, counts = np.unique(owner[hit], return_counts=True)
+    things = frozenset(seen[seen >= shell_owners].tolist())
+    reason = ""
+    if hit.mean() < 1 - OUTSIDE_SHARE:
+        reason = "looks outside"
+    else:
+        depth = distance[hit].astype(np.float64)
+        mean = depth.mean()
+        if depth.min() < NEAREST:
+            reason = "too close"
+        elif not MEAN_DEPTH[0] <= mean <= MEAN_DEPTH[1]:
+            reason = "mean depth"
+        elif depth.std() < DEPTH_SPREAD * mean:
+            reason = "flat depth"
+        elif counts.max() > LARGEST_SHARE * len(owner):
+            reason = "one surface"
+        elif len(things) < OBJECTS:
+            reason = "few objects"
+    return View(camera, reason, len(things), things)

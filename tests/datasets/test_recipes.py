@@ -1,0 +1,109 @@
+from pathlib import Path
+
+import pytest
+
+from gibench.datasets.errors import RecipeError
+from gibench.datasets.recipes import Recipe, check_recipe, load_preset, load_recipe, preset_names
+from gibench.rendering.channels import resolve
+
+
+def test_presets_are_those_that_the_readme_names():
+    assert preset_names() == ("paper", "small", "smoke")
+    smoke, small, paper = (load_preset(name) for name in ("smoke", "small", "paper"))
+    assert (smoke.rooms, smoke.views, smoke.resolution, smoke.spp, smoke.denoise) == (
+        2,
+        2,
+        (64, 48),
+        16,
+        False,
+    )
+    assert (small.views, small.resolution, small.spp, small.denoise) == (4, (256, 192), 64, True)
+    assert (paper.views, paper.resolution, paper.spp) == (20, (768, 512), 1024)
+
+
+def test_defaults_are_the_preset_small():
+    assert Recipe() == load_preset("small")
+
+
+def test_a_file_is_read_and_options_win(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text('rooms = 7\nresolution = [32, 24]\nerror = 0.05\nchannels = ["depth", "color"]\n')
+    recipe = load_recipe(path)
+    assert (recipe.rooms, recipe.resolution, recipe.error, recipe.spp) == (7, (32, 24), 0.05, None)
+    assert recipe.channels == ("color", "depth")
+    changed = load_recipe(path, {"spp": 8, "rooms": 2, "channels": ("radiance",)})
+    assert (changed.rooms, changed.spp, changed.error) == (2, 8, None)
+    assert changed.channels == resolve(["radiance"])
+
+
+def test_a_path_of_an_environment_counts_from_the_recipe(tmp_path):
+    (tmp_path / "sky.exr").write_bytes(b"x")
+    (tmp_path / "mine.toml").write_text('environment = "sky.exr"\n')
+    assert load_recipe(tmp_path / "mine.toml").environment == str(tmp_path / "sky.exr")
+
+
+def test_identity_leaves_out_the_number_of_rooms_and_takes_files_by_content(tmp_path):
+    assert Recipe(rooms=3).identity() == Recipe(rooms=9).identity()
+    assert Recipe(seed=3).identity() != Recipe(seed=4).identity()
+    (tmp_path / "a.exr").write_bytes(b"light")
+    (tmp_path / "b.exr").write_bytes(b"light")
+    (tmp_path / "c.exr").write_bytes(b"other")
+    a, b, c = (Recipe(environment=str(tmp_path / f"{name}.exr")).identity() for name in "abc")
+    assert a == b != c
+
+
+def test_a_recipe_survives_json():
+    recipe = load_preset("paper")
+    assert Recipe.model_validate(recipe.model_dump(mode="json")) == recipe
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("rooms = 0", "rooms: 0 is not allowed; allowed is an integer from 1"),
+        ('rooms = "4"', "rooms: '4' is not allowed; allowed is an integer"),
+        ("views = 2.5", "views: 2.5 is not allowed; allowed is an integer"),
+        ("denoise = 1", "denoise: 1 is not allowed; allowed is true or false"),
+        ("resolution = [256]", "resolution: [256] is not allowed; allowed is two integers [width, height]"),
+        ("resolution = [256, -1]", "resolution: [256, -1] is not allowed"),
+        ('resolution = ["a", 2]', "allowed is two integers [width, height]"),
+        ("kinds = []", "kinds: [] is not allowed; allowed is a list of room kinds"),
+        ('kinds = ["livingroom"]', "no kind 'livingroom'; did you mean 'living'"),
+        ('channels = ["colour"]', "did you mean color"),
+        ("error = 2.0", "error: 2.0 is not allowed; allowed is a number between 0 and 1"),
+        ("spp = 4\nerror = 0.1", "spp and error are both set"),
+        ("roms = 4", "unknown key 'roms'; did you mean 'rooms'"),
+        ('path = "fly"', 'path: \'fly\' is not allowed; allowed is "stills", "walk"'),
+        ("splits = {train = 0.5}", "the shares do not sum to 1"),
+        ("splits = {train = 1.5, test = -0.5}", "the shares do not sum to 1"),
+        ('environment = "sunsk"', "there is no file"),
+        ("rooms = ", "is no valid TOML"),
+    ],
+)
+def test_what_is_wrong_is_said_with_file_key_and_what_is_allowed(tmp_path, text, says):
+    path = tmp_path / "mine.toml"
+    path.write_text(text)
+    with pytest.raises(RecipeError) as caught:
+        load_recipe(path)
+    message = str(caught.value)
+    assert says in message
+    assert "mine.toml" in message
+    assert "\n" not in message
+
+
+def test_wrong_options_are_named_as_options():
+    with pytest.raises(RecipeError, match=r"^--rooms: 0 is not allowed; allowed is an integer from 1"):
+        load_preset("small", {"rooms": 0})
+    with pytest.raises(RecipeError, match=r"^--kind: no kind 'kitchen'; did you mean 'dining-kitchen'"):
+        load_preset("small", {"kinds": ("kitchen",)})
+    with pytest.raises(RecipeError, match="both set"):
+        load_preset("small", {"spp": 4, "error": 0.1})
+
+
+def test_missing_files_and_presets():
+    with pytest.raises(RecipeError, match=r"no preset 'smal'; did you mean 'small'\?"):
+        load_preset("smal")
+    with pytest.raises(RecipeError, match="cannot be read: No such file"):
+        load_recipe(Path("nowhere.toml"))
+    with pytest.raises(RecipeError, match=r"there is no file /nowhere\.exr"):
+        check_recipe({"environment": "/nowhere.exr"})

@@ -1,0 +1,124 @@
+import hashlib
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+import pandas as pd
+import pytest
+
+from gibench.datasets.exr import encode, layer_names, stored_types
+from gibench.datasets.verifying import frame_faults, verify
+from gibench.rendering.channels import CHANNELS
+from tests.datasets.fakes import pixels, tiny
+
+
+@pytest.fixture
+def copy(rooms_made, tmp_path) -> Path:
+    shutil.copytree(rooms_made, tmp_path / "d")
+    return tmp_path / "d"
+
+
+def broken(root: Path) -> dict[str, str]:
+    return {problem.file: problem.what for problem in verify(root)}
+
+
+def test_a_whole_dataset_has_no_problem(rooms_made):
+    seen = []
+    assert verify(rooms_made, lambda done, of: seen.append((done, of))) == []
+    assert seen == [(done, 12) for done in range(13)]
+
+
+def test_every_broken_file_is_named(copy):
+    rooms = copy / "rooms"
+    flipped = rooms / "000001/frames/0000.exr"
+    content = bytearray(flipped.read_bytes())
+    content[len(content) // 2] ^= 1
+    flipped.write_bytes(content)
+    short = rooms / "000002/frames/0001.exr"
+    short.write_bytes(short.read_bytes()[:-7])
+    (rooms / "000003/frames/0000.exr").unlink()
+    (rooms / "000004/scene.xml").write_text("other")
+    (rooms / "000005/frames.json").write_text("{")
+    (rooms / "000006/frames.json").write_text("{}")
+    shutil.rmtree(rooms / "000007")
+    (copy / "preview.png").unlink()
+    shutil.copytree(rooms / "000008", rooms / "000012")
+    found = broken(copy)
+    assert set(found) == {
+        "rooms/000001/frames/0000.exr",
+        "rooms/000002/frames/0001.exr",
+        "rooms/000003/frames/0000.exr",
+        "rooms/000004/scene.xml",
+        "rooms/000005/frames.json",
+        "rooms/000006/frames.json",
+        "rooms/000007",
+        "rooms/000012",
+        "frames.parquet",
+        "preview.png",
+    }
+    assert "SHA-256 differs" in found["rooms/000004/scene.xml"] or "bytes" in found["rooms/000004/scene.xml"]
+    assert "cannot be read" in found["rooms/000003/frames/0000.exr"]
+    assert found["rooms/000007"] == "the room is missing"
+
+
+def test_a_frame_of_the_wrong_kind_is_found_even_where_its_hash_is_right(copy):
+    path = copy / "rooms/000000/frames/0000.exr"
+    arrays = pixels(tuple(CHANNELS)[:-1], (16, 12), seed=1)
+    path.write_bytes(encode(arrays))
+    record = json.loads((copy / "rooms/000000/frames.json").read_text())
+    record["frames"][0]["bytes"] = path.stat().st_size
+    record["frames"][0]["sha256"] = hashlib.sha256(path.read_bytes()).hexdigest()
+    (copy / "rooms/000000/frames.json").write_text(json.dumps(record))
+    found = broken(copy)
+    assert found["rooms/000000/frames/0000.exr"] == "channel motion_valid is missing"
+    assert "frames.parquet" in found
+
+
+def test_a_table_that_says_something_else_is_found(copy):
+    table = pd.read_parquet(copy / "frames.parquet")
+    table.loc[3, "spp"] += 1
+    table.to_parquet(copy / "frames.parquet", index=False)
+    assert set(broken(copy)) == {"frames.parquet"}
+    (copy / "frames.parquet").write_bytes(b"nothing")
+    assert "damaged" in broken(copy)["frames.parquet"]
+    (copy / "frames.parquet").unlink()
+    assert "missing" in broken(copy)["frames.parquet"]
+
+
+def faults(**changed: np.ndarray) -> list[str]:
+    recipe = tiny(channels=("radiance", "surface"))
+    return list(frame_faults({**stored_types(pixels(recipe.channels, (16, 12), seed=9)), **changed}, recipe))
+
+
+def test_faults_of_frames():
+    whole = stored_types(pixels(tiny().channels, (16, 12), seed=9))
+    assert faults() == []
+    color = whole["color"].copy()
+    color[3, 4, 1] = np.nextafter(color[3, 4, 1], color.dtype.type(np.inf))
+    assert faults(color=color) == ["color is not the sum of its five parts in 1 pixels"]
+    assert faults(normal=whole["normal"] * np.float32(np.nan)) == [
+        "channel normal has values that are not finite"
+    ]
+    assert faults(normal=whole["normal"].astype(np.float16)) == ["channel normal is stored as float16"]
+    assert faults(shape_id=whole["shape_id"].astype(np.float32)) == ["channel shape_id is stored as float32"]
+    assert faults(color_se=-whole["color_se"]) == ["channel color_se has negative values"]
+    assert faults(depth=whole["depth"][:6]) == ["channel depth is 16x6, the recipe asks for 16x12"]
+    assert faults(motion=whole["position"][..., :2]) == ["channel motion is none of the recipe's"]
+
+
+def test_a_sum_that_another_program_rounded_differently_is_found(tmp_path):
+    """The identity is checked on the file, not on what the writer remembers."""
+    stored = stored_types(pixels(("color", *tiny().channels[1:6]), (16, 12), seed=2))
+    stored["color"] = np.nextafter(stored["color"], np.zeros_like(stored["color"]))
+    layers = {
+        layer: np.ascontiguousarray(values[..., i])
+        for name, values in stored.items()
+        for i, layer in enumerate(layer_names(CHANNELS[name]))
+    }
+    OpenEXR.File({"type": OpenEXR.scanlineimage}, layers).write(str(tmp_path / "f.exr"))
+    from gibench.datasets.exr import decode
+
+    said = list(frame_faults(decode(tmp_path / "f.exr"), tiny(channels=tuple(stored))))
+    assert said == ["color is not the sum of its five parts in 192 pixels"]
