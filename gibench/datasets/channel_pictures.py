@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gibench.generators.materials.color import lch
+from gibench.metrics import reference_exposure, tone_map
 from gibench.rendering.channels import Channel
-from gibench.rendering.tonemap import auto_exposure, display, srgb_encode
 
 Picture = NDArray[np.float32]
 
@@ -22,10 +22,10 @@ def picture_of(channel: Channel, values: NDArray[Any], exposure: float) -> tuple
     needs saying.
     """
     if channel.name == "color_se":
-        own = auto_exposure(values)
-        return display(values, own), f"exposure x{own / exposure:.0f}"
+        own = float(reference_exposure(values))
+        return tone_map(values, own), f"exposure x{own / exposure:.0f}"
     if channel.set == "radiance":
-        return display(values, exposure), ""
+        return tone_map(values, exposure), ""
     if channel.dtype == "uint":
         ids = values[..., 0]
         return id_colors(ids), f"{np.unique(ids[ids > 0]).size} of them"
@@ -34,7 +34,7 @@ def picture_of(channel: Channel, values: NDArray[Any], exposure: float) -> tuple
     if channel.components == 1:
         return np.repeat(np.clip(values, 0, 1), 3, axis=-1).astype(np.float32), "0 … 1"
     if channel.dtype == "half":
-        return srgb_encode(np.clip(values, 0, 1)), ""
+        return tone_map(values, 1.0), ""
     if channel.unit == "m":
         return _positions(values)
     if channel.components == 2:
@@ -55,7 +55,7 @@ def id_colors(ids: NDArray[Any]) -> Picture:
         0.15 + 0.5 * np.mod(turns * 0.7549, 1), 0.08 + 0.08 * np.mod(turns * 0.5698, 1), turns * 2.39996
     )
     palette = np.concatenate([np.zeros((1, 3)), colors])
-    return srgb_encode(np.clip(palette[ids], 0, 1))
+    return _srgb(palette[ids])
 
 
 def scale_colors(shares: NDArray[Any]) -> Picture:
@@ -65,7 +65,12 @@ def scale_colors(shares: NDArray[Any]) -> Picture:
     """
     shares = np.clip(np.asarray(shares, np.float64), 0, 1)
     lightness = 0.28 + 0.66 * shares
-    return srgb_encode(np.clip(lch(lightness**3, 0.13, 4.9 - 3.0 * shares), 0, 1))
+    return _srgb(lch(lightness**3, 0.13, 4.9 - 3.0 * shares))
+
+
+def _srgb(linear: NDArray[Any]) -> Picture:
+    """Clip colours to the gamut and encode them."""
+    return tone_map(np.maximum(linear, 0.0), 1.0).astype(np.float32)
 
 
 def _distance(values: NDArray[Any]) -> tuple[Picture, str]:

@@ -14,8 +14,8 @@ from PIL import Image, ImageDraw, ImageFont
 from gibench.datasets.channel_pictures import Picture, picture_of
 from gibench.datasets.exr import decode
 from gibench.datasets.files import write_whole
+from gibench.metrics import reference_exposure, tone_map
 from gibench.rendering.channels import CHANNELS
-from gibench.rendering.tonemap import auto_exposure, display
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -49,7 +49,7 @@ def contact_sheet(root: Path, table: pd.DataFrame) -> Image.Image:
 def frame_panel(frame: Frame) -> Image.Image:
     """Show one frame with all its channels, each with its name and the meaning of its colours."""
     arrays = frame.read()
-    exposure = auto_exposure(arrays["color"]) if "color" in arrays else 1.0
+    exposure = float(reference_exposure(arrays["color"])) if "color" in arrays else 1.0
     tiles = []
     for name, values in arrays.items():
         picture, legend = picture_of(CHANNELS[name], values, exposure)
@@ -69,7 +69,7 @@ def _thumbnail(path: Path) -> Image.Image:
     name = "color" if "color" in arrays else next(iter(arrays))
     values = arrays[name]
     if name == "color":
-        picture: Picture = display(values, auto_exposure(values))
+        picture: Picture = tone_map(values, reference_exposure(values))
     else:
         picture, _ = picture_of(CHANNELS[name], values, 1.0)
     image = _image(picture)

@@ -198,7 +198,7 @@ class RoomMaker:
         }
 
     def _stored(self, folder: Path, room: Room, view: int, rendered: RenderedFrame) -> dict[str, Any]:
-        from gibench.rendering.tonemap import auto_exposure
+        from gibench.metrics import reference_exposure
 
         try:
             content = exr.encode(rendered.arrays)
@@ -217,7 +217,7 @@ class RoomMaker:
             "fov": camera.fov,
             "path": camera.path,
             "step": camera.step,
-            "exposure": None if color is None else auto_exposure(color),
+            "exposure": None if color is None else float(reference_exposure(color)),
             "largest": None if color is None else float(color.max()),
             "spp": rendered.spp,
             "paths": rendered.paths,

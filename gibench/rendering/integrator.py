@@ -5,7 +5,7 @@ weights, one for the diffuse reflection and one for everything else; the rest of
 second vertex emits is direct light, all that comes later is indirect.
 
 Multiple importance sampling with the balance-heuristic power 2 (Veach 1997, section 9.2.4), next-event
-estimation at every vertex, Russian roulette from `RR_DEPTH` on: the same estimator as Mitsuba's `path`.
+estimation at every vertex, Russian roulette from `RR_DEPTH` on.
 """
 
 # mypy: disable-error-code="no-untyped-def, misc"
@@ -20,8 +20,9 @@ import mitsuba as mi
 
 from gibench.rendering.backend import is_scalar
 
-RR_DEPTH = 5
-"""Scattering events after which Russian roulette may end a path, as in Mitsuba's `path`."""
+RR_DEPTH = 3
+"""Scattering events after which Russian roulette may end a path. Variance times time over three furnished rooms is 3 to
+18 % below that of 5, the value of Mitsuba's `path`."""
 
 SMALLEST = 1.2e-38
 """The smallest normal float32."""

@@ -43,13 +43,17 @@ def test_factorized_render_against_path(spp, material):
     options = {"resolution": (256, 256), "spp": spp, "max_depth": 8}
 
     def factorized(seed):
-        render_frame(scene, scenes.CAMERA, channels=["radiance", "surface", "reflection"], seed=seed, **options)
+        render_frame(
+            scene, scenes.CAMERA, channels=["radiance", "surface", "reflection"], seed=seed, **options
+        )
 
     def path(seed):
         scenes.render_path(scene.mi_scene, scenes.CAMERA, 256, spp, seed, 8)
 
     ours, theirs, ratio = _median_ratio(factorized, path)
-    print(f"\n{material}, {spp} spp, 256²: factorized {ours:.2f} s, path {theirs:.2f} s, ratio {ratio:.2f} (reach 1.15)")
+    print(
+        f"\n{material}, {spp} spp, 256²: factorized {ours:.2f} s, path {theirs:.2f} s, ratio {ratio:.2f} (reach 1.15)"
+    )
 
 
 def test_stratified_against_independent_samples():

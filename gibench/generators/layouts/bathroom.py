@@ -32,7 +32,7 @@ def furnish(plan: Plan) -> None:
             dressing.wall_lamps_beside(plan, mirror, 1.6)
     if plan.chance(0.8):
         x, y = tub.point(0.0, tub.half[1] + 0.42)
-        dressing.rug_under(plan, x, y, tub.yaw, width=0.95, depth=0.6)
+        dressing.rug_under(plan, x, y, tub.yaw, width=0.95, depth=0.6, bare=True)
     furniture = {
         "shelf": 1.5,
         "dresser": 1.0,

@@ -85,8 +85,8 @@ def _rug(plan: Plan, bed: Placed) -> None:
     half_x, half_y = bed.half
     if draw < 0.4:
         x, y = bed.point(0.0, half_y + 0.55)
-        dressing.rug_under(plan, x, y, bed.yaw, width=2 * half_x + 0.4, depth=0.9)
+        dressing.rug_under(plan, x, y, bed.yaw, width=2 * half_x + 0.4, depth=0.9, bare=True)
     elif draw < 0.8:
         side = 1 if plan.chance(0.5) else -1
         x, y = bed.point(side * (half_x + 0.45), 0.2)
-        dressing.rug_under(plan, x, y, bed.yaw, width=0.75, depth=1.5)
+        dressing.rug_under(plan, x, y, bed.yaw, width=0.75, depth=1.5, bare=True)

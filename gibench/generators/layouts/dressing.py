@@ -66,9 +66,11 @@ def hang_curtains(plan: Plan, share: float) -> None:
         hang(plan, curtain, wall, (window.s0 + window.s1) / 2, bottom, away=CURTAIN_AWAY)
 
 
-def rug_under(plan: Plan, x: float, y: float, yaw: float, *, width: float, depth: float) -> Placed | None:
-    """Lay a rug at a place, smaller and smaller until it fits."""
-    style = "bordered" if plan.chance(0.5) else "plain"  # an oval one has no corners to stand on
+def rug_under(
+    plan: Plan, x: float, y: float, yaw: float, *, width: float, depth: float, bare: bool = False
+) -> Placed | None:
+    """Lay a rug at a place, smaller and smaller until it fits. bare: nothing is to stand on it."""
+    style = str(plan.rng.choice(["bordered", "plain", "oval"])) if bare else "plain"
     for shrink in (1.0, 0.85, 0.7):
         size = [
             round(float(np.clip(v * shrink, low, high)), 4)

@@ -21,12 +21,13 @@ from gibench.generators.layouts.solids import (
     component_boxes,
     corners,
     grown,
+    meets_any,
     moved,
     overlap,
     rectangle,
     whole_box,
 )
-from gibench.generators.openings import ARCHITRAVE
+from gibench.generators.openings import ARCHITRAVE, SILL, SILL_REACH
 from gibench.generators.parts import FloatArray, Furniture, Support
 from gibench.generators.poses import turn
 from gibench.generators.shell import Shell
@@ -100,6 +101,7 @@ class Plan:
         self.shell, self.kind, self.rng = shell, kind, rng
         self.placed: list[Placed] = []
         self._boxes = np.zeros((0, 7))
+        self._owners = np.zeros(0, dtype=int)  # of each box, the number of its piece in `placed`
         self._zones = np.zeros((0, 7))
         self._may_enter: list[frozenset[str]] = []  # one for each zone
         self._counts: dict[str, int] = {}
@@ -121,6 +123,9 @@ class Plan:
             half = (window.s1 - window.s0) / 2 + 0.05
             box = rectangle(x, y, half, 0.2, wall.yaw, window.z0 - 0.05, window.z1)
             self.keep_free(box, ("curtain", "plant", "floor_lamp"))
+            x, y = wall.point((window.s0 + window.s1) / 2, SILL_REACH / 2)
+            low, high = window.z0 - CLOSE, window.z0 + SILL + CLOSE
+            self.keep_free(rectangle(x, y, half, SILL_REACH / 2 + CLOSE, wall.yaw, low, high))
 
     def sample(self, family: str, **fixed: Any) -> Furniture:
         """Draw a piece of furniture from the layout's lane."""
@@ -135,11 +140,16 @@ class Plan:
         return component_boxes(furniture) if furniture.family in AIRY else whole_box(furniture)
 
     def floor_level(self, boxes: FloatArray) -> float | None:
-        """Height of what carries a piece that stands there: the floor or one rug; None across a rug's edge."""
+        """Height of what carries a piece that stands there: the floor, or a rug of one thickness all over.
+
+        None across the edge of a rug, and on rugs with a border that lies lower.
+        """
         level = 0.0
         footing = boxes[boxes[:, 5] < boxes[:, 5].min() + 0.02]
         for rug in self.placed:
             if rug.furniture.family == "rug" and overlap(_flat(footing), _flat(rug.boxes)).any():
+                if rug.furniture.parameters.get("style", "plain") != "plain":
+                    return None
                 inside = shapely.Polygon(corners(grown(rug.boxes, -0.01))[0])
                 if not all(inside.covers(shapely.Polygon(c)) for c in corners(footing)):
                     return None
@@ -180,8 +190,9 @@ class Plan:
         self._counts[furniture.family] = count + 1
         position = (float(xy[0]), float(xy[1]), float(z))
         thing = Placed(f"{furniture.family}.{count}", furniture, position, yaw, boxes, on.name if on else "")
-        self.placed.append(thing)
         self._boxes = np.concatenate([self._boxes, boxes])
+        self._owners = np.concatenate([self._owners, np.full(len(boxes), len(self.placed))])
+        self.placed.append(thing)
         if zone is not None:
             self.keep_free(zone, zone_but)
         return thing
@@ -208,17 +219,17 @@ class Plan:
         points = corners(boxes).reshape(-1, 2)
         if (points < self._low + inset - 1e-9).any() or (points > self._high - inset + 1e-9).any():
             return False
-        if overlap(grown(boxes, inset - 1e-6), self._notch).any():
+        if meets_any(grown(boxes, inset - 1e-6), self._notch):
             return False
         if boxes[:, 6].max() > self.shell.height + 1e-6:
             return False
         barred = [furniture.family not in families for families in self._may_enter]
-        if overlap(boxes, self._zones[barred]).any():
+        if meets_any(boxes, self._zones[barred]):
             return False
         others = self._boxes
         if on is not None:
-            others = np.concatenate([p.boxes for p in self.placed if p is not on] or [np.zeros((0, 7))])
-        return not overlap(grown(boxes, margin), others).any()
+            others = others[self._owners != self.placed.index(on)]
+        return not meets_any(grown(boxes, margin), others)
 
     def blocked(self, zone: FloatArray, but: Sequence[str] = ()) -> bool:
         """Whether a zone (1, 7) leaves the room, or meets furniture other than rugs and the named families."""

@@ -102,6 +102,16 @@ def overlap(a: FloatArray, b: FloatArray) -> NDArray[np.bool_]:
     return meets
 
 
+def meets_any(a: FloatArray, b: FloatArray) -> bool:
+    """Whether any box of a shares volume with any of b; fast where most of b is far away."""
+    reach = np.hypot(a[:, 2], a[:, 3])
+    low, high = (a[:, :2] - reach[:, None]).min(0), (a[:, :2] + reach[:, None]).max(0)
+    reach = np.hypot(b[:, 2], b[:, 3])[:, None]
+    near = ((b[:, :2] + reach > low) & (b[:, :2] - reach < high)).all(1)
+    near &= (b[:, 5] < a[:, 6].max()) & (b[:, 6] > a[:, 5].min())
+    return bool(near.any()) and bool(overlap(a, b[near]).any())
+
+
 def rectangle(
     x: float, y: float, half_x: float, half_y: float, yaw: float, z0: float, z1: float
 ) -> FloatArray:

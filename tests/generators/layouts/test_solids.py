@@ -8,6 +8,7 @@ from gibench.generators.layouts.solids import (
     component_boxes,
     corners,
     grown,
+    meets_any,
     moved,
     overlap,
     rectangle,
@@ -38,6 +39,14 @@ def test_overlap_agrees_with_polygons():
     shared = shapely.area(shapely.intersection(polygons[0][:, None], polygons[1][None]))
     heights = np.minimum(a[:, None, 6], b[None, :, 6]) - np.maximum(a[:, None, 5], b[None, :, 5])
     np.testing.assert_array_equal(overlap(a, b), (shared > 1e-9) & (heights > 0))
+
+
+def test_meeting_any_is_overlapping_one():
+    rng = np.random.default_rng(2)
+    for _ in range(200):
+        a, b = random_boxes(rng, 2), random_boxes(rng, int(rng.integers(0, 5)))
+        b[:, :2] *= 2
+        assert meets_any(a, b) == overlap(a, b).any()
 
 
 def test_touching_is_no_overlap():

@@ -81,7 +81,9 @@ def test_textures_count_tiles_with_row_zero_at_v_zero(mi, tmp_path):
     material = Material("probe", "probe", "diffuse", Texture(pixels, (2.0, 0.5)))
     bsdf = load(mi, material, tmp_path)
     centres = np.array([[u, v] for v in (0.125, 0.375, 0.625) for u in (0.25, 1.75, 2.25)])
-    value = np.array(bsdf.eval_diffuse_reflectance(surface(mi, centres / tile_size(material)))).reshape(3, -1).T
+    value = (
+        np.array(bsdf.eval_diffuse_reflectance(surface(mi, centres / tile_size(material)))).reshape(3, -1).T
+    )
     seen = np.round(255 * (1.055 * value ** (1 / 2.4) - 0.055))
     low, high, red = [60] * 3, [200] * 3, [200, 60, 60]
     assert seen == pytest.approx(np.array([low, red, low, high, red, high, low, red, low]), abs=1)

@@ -1,39 +1,15 @@
-"""Tone mapping and denoising."""
+"""Denoising."""
 
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
-from gibench.rendering import denoise, tonemap
+from gibench.rendering import denoise
 from gibench.rendering.channels import PARTS
 from gibench.rendering.render import render_frame
 from gibench.rendering.scene import load_dict
 
 from . import scenes
-
-
-@pytest.mark.parametrize("level", [1e-8, 1.0, 1e6])
-def test_exposure_puts_a_grey_image_at_middle_grey(level):
-    exposure = tonemap.auto_exposure(np.full((4, 5, 3), level))
-    assert level * exposure == pytest.approx(tonemap.MIDDLE_GREY)
-
-
-def test_exposure_of_black_and_of_broken_images_is_finite():
-    assert tonemap.auto_exposure(np.zeros((3, 3, 3))) == 1.0
-    image = np.full((2, 2, 3), 0.5)
-    image[0, 0] = np.inf
-    assert tonemap.auto_exposure(image) == pytest.approx(tonemap.MIDDLE_GREY / 0.5)
-    assert np.isfinite(tonemap.auto_exposure(np.full((2, 2, 3), 1e-200)))
-
-
-def test_srgb_known_values():
-    """IEC 61966-2-1: the two branches meet, 0 and 1 are fixed, 18 % grey is code 118 of 255."""
-    np.testing.assert_allclose(tonemap.srgb_encode([0.0, 1.0]), [0, 1], atol=1e-7)
-    assert round(255 * float(tonemap.srgb_encode(0.18))) == 118
-    below, above = tonemap.srgb_encode(np.array([0.0031307, 0.0031309]))
-    assert abs(above - below) < 1e-5
-    assert tonemap.display(np.array([1e9, 0.5, 0.0]), 1.0).max() == 1.0
 
 
 def test_denoising_reduces_the_error_and_keeps_the_sum():
