@@ -15,6 +15,9 @@ import gibench
 #: Packages whose versions matter when something goes wrong; the last ones come with extras.
 PACKAGES = ("mitsuba", "drjit", "mitsuba-oidn", "numpy", "OpenEXR", "pandas", "torch", "lpips")
 
+#: Columns of what stands beside the names.
+WIDTH = 66
+
 # A bad LLVM library aborts the whole process, and the doctor must live to tell.
 _PROBE = "import json; from gibench.rendering import backend; print(json.dumps(backend.describe()))"
 
@@ -100,11 +103,15 @@ def _tell(facts: dict[str, Any]) -> None:
         "to mend": "\n".join(facts["notes"]) or "nothing",
     }
     for name, text in rows.items():
-        # Wrapped to 80 columns; paths and commands stay in one piece for copying.
-        lines = [
-            piece
-            for line in text.splitlines()
-            for piece in textwrap.wrap(line, 66, break_long_words=False, break_on_hyphens=False)
-        ]
+        lines = [piece for line in text.splitlines() for piece in _wrapped(line, is_note=name == "to mend")]
         for i, line in enumerate(lines):
             typer.echo(f"{name if i == 0 else '':<14}{line}")
+
+
+def _wrapped(line: str, *, is_note: bool) -> list[str]:
+    """A line in pieces that fit 80 columns beside the names; paths, and the command that ends a note, stay whole."""
+    command: list[str] = []
+    if is_note and len(line) > WIDTH and ": " in line:
+        line, _, last = line.rpartition(": ")
+        line, command = f"{line}:", [last]
+    return textwrap.wrap(line, WIDTH, break_long_words=False, break_on_hyphens=False) + command

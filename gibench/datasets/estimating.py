@@ -93,7 +93,7 @@ class RoomChecker:
         with tempfile.TemporaryDirectory(prefix="gibench-") as scratch:
             started = time.perf_counter()
             write_room(room, scratch)
-            scene = load_scene(Path(scratch) / "scene.xml")
+            scene = load_scene(Path(scratch) / "scene.xml", share_kernels=True)
             load_seconds = time.perf_counter() - started
             size = sum(file.stat().st_size for file in Path(scratch).rglob("*") if file.is_file())
             rendered_frame(recipe, scene, room, 0, **settings)  # compiles the kernels
@@ -154,7 +154,9 @@ def _scale(result: Estimate, measured: dict[str, float]) -> None:
     pixels = recipe.resolution[0] * recipe.resolution[1]
     result.paths_per_second = measured["paths_per_second"]
     paths = pixels * (recipe.spp or recipe.spp_cap)
-    result.seconds_per_frame = paths / measured["paths_per_second"] + pixels * measured["pixel_seconds"]
+    # Without radiance there are no paths.
+    path_seconds = paths / result.paths_per_second if result.paths_per_second > 0 else 0.0
+    result.seconds_per_frame = path_seconds + pixels * measured["pixel_seconds"]
     result.bytes_per_frame = pixels * measured["pixel_bytes"]
     result.bytes_per_room = measured["room_bytes"]
     result.load_seconds = measured["load_seconds"]

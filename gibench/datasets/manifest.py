@@ -24,12 +24,18 @@ if TYPE_CHECKING:
 #: Version of the layout on disk; a reader refuses what it does not know.
 FORMAT = 1
 
+#: What every manifest holds, finished or not.
+NEEDED = ("complete", "identity", "licence", "command", "variant", "versions", "runs", "rejected_rooms")
+
 
 def read_manifest(root: Path) -> dict[str, Any]:
     """Read `dataset.json`. Raises `DatasetError` when the folder is no dataset or of another format."""
     try:
         manifest = json.loads((root / MANIFEST).read_text(encoding="utf-8"))
         known = manifest["format"] == FORMAT
+        if known:
+            recipe_of(manifest)
+            _ = [manifest[key] for key in NEEDED]
     except OSError:
         raise DatasetError(f"{root} is no dataset: it has no readable {MANIFEST}") from None
     except (ValueError, KeyError, TypeError):

@@ -21,7 +21,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any
 
-from gibench.datasets.errors import MakingError
+from gibench.datasets.errors import MakingError, RecipeError
 from gibench.errors import GibenchError
 
 #: Rooms after which a worker makes way for a fresh one.
@@ -66,8 +66,8 @@ def run_rooms(work: Work, rooms: Iterable[int], listener: Listener, *, workers: 
     """Do every room, in up to `workers` processes at a time; returns when all are done.
 
     A room whose worker dies is tried once more in a fresh one. Raises `MakingError` when it dies again, and
-    for whatever a job raises (a `GibenchError` keeps its message). All workers are gone when this returns or
-    raises.
+    for whatever a job raises (a `GibenchError` keeps its message); a `RecipeError` of the setup stays one. All workers
+    are gone when this returns or raises.
     """
     left = deque(rooms)
     deaths: set[int] = set()
@@ -81,7 +81,8 @@ def run_rooms(work: Work, rooms: Iterable[int], listener: Listener, *, workers: 
             for worker in crew:
                 if worker.ready and worker.room is None and left:
                     worker.room = left.popleft()
-                    worker.connection.send(worker.room)
+                    with contextlib.suppress(OSError):  # it has just died, and is heard of below
+                        worker.connection.send(worker.room)
             wait([worker.connection for worker in crew])
             for worker in [w for w in crew if w.connection.poll()]:
                 try:
@@ -106,6 +107,8 @@ def _heard(worker: _Worker, kind: str, content: Any, listener: Listener) -> bool
         worker.ready = True
         listener.ready(content)
         return False
+    if kind == "refused":
+        raise RecipeError(content)
     if kind == "failed":
         raise MakingError(content)
     assert worker.room is not None
@@ -123,14 +126,16 @@ def _heard(worker: _Worker, kind: str, content: Any, listener: Listener) -> bool
 
 
 def _room_of_the_dead(worker: _Worker, deaths: set[int], listener: Listener) -> list[int]:
-    """Rooms to do again after a worker's death: the one in hand. Raises `MakingError` the second time."""
+    """Rooms to do again after a worker's death: the one in hand, if any. Raises `MakingError` the second time."""
     worker.process.join()
     code = worker.process.exitcode or 0
     how = f"killed by {signal.Signals(-code).name}" if code < 0 else f"ended with code {code}"
-    if worker.room is None:
+    if not worker.ready:
         raise MakingError(
             f"a worker was {how} before its first room: `gibench doctor` shows whether rendering works"
         )
+    if worker.room is None:
+        return []
     listener.died(worker.room)
     if worker.room in deaths:
         hint = "lower --workers if memory ran out, then run the same command again to continue"
@@ -161,6 +166,8 @@ def _worker(connection: Connection, work: Work) -> None:
             except EOFError:
                 return
             connection.send(("done", work.job(room, lambda kind, content: connection.send((kind, content)))))
+    except RecipeError as problem:
+        connection.send(("refused", str(problem)))
     except Exception as problem:
         if os.environ.get("GIBENCH_DEBUG"):
             traceback.print_exc()

@@ -51,7 +51,7 @@ class Recipe(BaseModel):
         None, gt=0, lt=1, description="a number between 0 and 1 (median relative error), or spp in its place"
     )
     spp_cap: int = Field(
-        4096, ge=1, le=2**20, description="an integer from 1 to 1048576 (most samples for error)"
+        4096, ge=64, le=2**20, description="an integer from 64 to 1048576 (most samples for error)"
     )
     max_depth: int = Field(8, ge=1, le=1000, description="an integer from 1 to 1000 (scattering events)")
     denoise: bool = Field(True, description="true or false")
@@ -79,9 +79,13 @@ class Recipe(BaseModel):
         return values
 
     @model_validator(mode="after")
-    def _one_way_to_stop(self) -> Self:
+    def _samples_that_can_be(self) -> Self:
         if self.spp is not None and self.error is not None:
             raise PydanticCustomError("both", "spp and error are both set; keep one of them")
+        if self.spp == 1 and "color_se" in self.channels:
+            raise PydanticCustomError(
+                "single", "channel color_se needs spp from 2 on; raise spp, or name channels without color_se"
+            )
         return self
 
     @field_validator("kinds")
@@ -106,7 +110,8 @@ class Recipe(BaseModel):
     @field_validator("splits")
     @classmethod
     def _whole_splits(cls, splits: dict[str, float]) -> dict[str, float]:
-        if not splits or min(splits.values()) < 0 or abs(sum(splits.values()) - 1.0) > 1e-6:
+        # Put so that NaN, which TOML has, fails too.
+        if not (splits and all(s >= 0 for s in splits.values()) and abs(sum(splits.values()) - 1) <= 1e-6):
             raise PydanticCustomError("splits", "the shares do not sum to 1")
         return splits
 
@@ -200,6 +205,8 @@ def _message(
     if not problem["loc"]:
         if options >= {"spp", "error"}:
             source = "options"
+        elif problem["type"] == "single" and "spp" in options:
+            source = "--spp"
         return f"{source}: {problem['msg']}"
     key = str(problem["loc"][0])
     if problem["type"] == "extra_forbidden":

@@ -19,7 +19,7 @@ import numpy as np
 
 import gibench
 from gibench.datasets import exr
-from gibench.datasets.errors import StorageError
+from gibench.datasets.errors import RecipeError, StorageError
 from gibench.datasets.files import as_json, sync_tree
 from gibench.datasets.folder import RECORD, partial_folder, room_folder
 from gibench.datasets.recipes import ENVIRONMENTS, Recipe
@@ -49,14 +49,17 @@ class Renderer:
     environment: str
 
     def __call__(self) -> dict[str, Any]:
-        """Return `variant`, `versions` and `gpu`. Raises `BackendError`, `BadEnvironment`."""
-        from gibench.generators.daylight import hdr
+        """Return `variant`, `versions` and `gpu`. Raises `BackendError`, and `RecipeError` for a bad environment."""
+        from gibench.generators.daylight import BadEnvironment, hdr
         from gibench.rendering import backend
 
         variant = backend.select_variant(self.variant)
         backend.limit_threads(self.threads)
         if self.environment not in ENVIRONMENTS:
-            hdr(path=self.environment, rotation=0.0, lux=1.0)
+            try:
+                hdr(path=self.environment, rotation=0.0, lux=1.0)
+            except BadEnvironment as problem:
+                raise RecipeError(f"environment: {problem}") from None
         versions = {"gibench": gibench.__version__}
         versions |= {name: importlib.metadata.version(name) for name in GENERATING}
         return {
@@ -165,7 +168,7 @@ class RoomMaker:
             spp=recipe.spp or recipe.spp_cap,
         )
         clock.lap("write")
-        scene = load_scene(folder / "scene.xml")
+        scene = load_scene(folder / "scene.xml", share_kernels=True)
         clock.lap("load")
         files = {
             str(path.relative_to(folder).as_posix()): _fingerprint(path.read_bytes())

@@ -191,7 +191,7 @@ def _floats(emitter: Element, values: Mapping[str, float]) -> None:
 @lru_cache(maxsize=8)
 def _irradiance(path: str, modified: int, size: int) -> float:
     """Irradiance, as luminance, that a panorama gives to level ground. modified, size: renew it for a new file."""
-    image = _read_panorama(path)
+    image = read_panorama(path)
     rows = len(image) // 2
     # Latitude bands: cosine at the ground times solid angle, integrated exactly over each row.
     edges = np.pi * np.arange(rows + 1) / len(image)
@@ -205,7 +205,7 @@ def _irradiance(path: str, modified: int, size: int) -> float:
     return irradiance
 
 
-def _read_panorama(path: str) -> NDArray[np.float64]:
+def read_panorama(path: str) -> NDArray[np.float64]:
     """(H, W, 3) linear RGB of a panorama that holds only finite values ≥ 0. Raises BadEnvironment."""
     from gibench.rendering.backend import select_variant
 

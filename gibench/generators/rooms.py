@@ -11,9 +11,9 @@ import numpy as np
 from gibench.errors import GibenchError
 from gibench.generators.cameras import PATHS, NoView, Stage, sample_path, sample_stills
 from gibench.generators.daylight import sample_daylight
-from gibench.generators.grid_solid import box
 from gibench.generators.layouts import FURNISH
-from gibench.generators.layouts.placement import Plan, RejectedRoom
+from gibench.generators.layouts.placement import Placed, Plan, RejectedRoom
+from gibench.generators.layouts.solids import bounds_of, component_boxes, moved, triangles, whole_box
 from gibench.generators.light_shapes import placed_light
 from gibench.generators.lighting import light_room
 from gibench.generators.materials import is_glossy
@@ -23,7 +23,7 @@ from gibench.generators.parts import Environment, FloatArray, Mesh, Part, Room, 
 from gibench.generators.poses import stand
 from gibench.generators.shapes import merge
 from gibench.generators.shell_sampling import sample_shell
-from gibench.generators.visibility import RayCaster
+from gibench.generators.visibility import RayCaster, Surface
 
 KINDS = tuple(FURNISH)
 LANES = ("kind", "shell", "layout", "materials", "lights", "cameras", "environment")
@@ -31,6 +31,7 @@ TRIES = 12  # of one room before it is given up
 LEAST_FREE = 0.8  # floor that cameras may stand on, m²
 LEAST_THINGS = 14  # pieces of furniture, lamps and small things included
 SMALL = 0.6  # longest side of what counts as a small thing, m
+DETAIL = 0.1  # longest side of what a view may be judged without, m
 GLOSSY_SHARE = 0.5  # share of rooms that are given a polished surface on purpose
 GLOSSY_AREA = 0.5  # least area of a surface that counts as large, m²
 LARGE = frozenset(
@@ -131,7 +132,7 @@ def _try_room(
     _polish_something(palette, plan)
     objects = _objects(plan, palette)
 
-    stage = Stage(free, shell.height, _middles(plan), _caster(objects), len(shell.pieces))
+    stage = Stage(free, shell.height, _middles(plan), _caster(plan), len(shell.pieces))
     if path is None:
         cameras, refused = sample_stills(lane("cameras"), stage, views)
     else:
@@ -170,22 +171,31 @@ def _try_room(
     )
 
 
-def _caster(objects: Sequence[RoomObject]) -> RayCaster:
+def _caster(plan: Plan) -> RayCaster:
     """Rays against everything in the room; the owner of a hit is the number of the object.
 
-    Small things are boxes here: they hold half of a room's triangles, and the grid of rays is coarser than they are.
+    The shell is what it is, but furniture is made of boxes here: the grid of rays is coarser than its details, and
+    a tenth of the triangles makes for a tenth of the building time.
     """
-    meshes: list[Mesh] = []
+    surfaces: list[Mesh | Surface] = []
     owners: list[int] = []
-    for number, thing in enumerate(objects):
-        own = [mesh for mesh, _ in thing.shapes]
-        low = np.min([mesh.vertices.min(0) for mesh in own], 0)
-        high = np.max([mesh.vertices.max(0) for mesh in own], 0)
-        if (high - low).max() < SMALL:
-            own = [box(low, high)]
-        meshes += own
-        owners += [number] * len(own)
-    return RayCaster(meshes, owners)
+    for number, piece in enumerate(plan.shell.pieces):
+        surfaces += [part.mesh for part in piece.parts]
+        owners += [number] * len(piece.parts)
+    for number, thing in enumerate(plan.placed, len(plan.shell.pieces)):
+        surfaces.append(triangles(_solid(thing)))
+        owners.append(number)
+    return RayCaster(surfaces, owners)
+
+
+def _solid(thing: Placed) -> FloatArray:
+    """(N, 7) boxes that show what a thing hides: one for a small thing, else one for each surface but the small ones."""
+    low, high = bounds_of(thing.furniture)
+    if (high - low).max() < SMALL:
+        return moved(whole_box(thing.furniture), thing.position, thing.yaw)
+    boxes = component_boxes(thing.furniture)
+    sizes = np.column_stack([2 * boxes[:, 2:4], boxes[:, 6] - boxes[:, 5]]).max(1)
+    return moved(boxes[sizes >= min(DETAIL, sizes.max())], thing.position, thing.yaw)
 
 
 def _middles(plan: Plan) -> FloatArray:

@@ -14,13 +14,16 @@ from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
 import numpy as np
 from PIL import Image
 
-from gibench.generators.daylight import environment_xml
 from gibench.generators.glb import write_glb
 from gibench.generators.light import radiance_of
 from gibench.generators.light_shapes import LAMP_MATERIAL, light_matrix
 from gibench.generators.materials import bsdf_xml, tile_size
 from gibench.generators.outside import GROUND, ground_element
+from gibench.generators.panorama import write_panorama
 from gibench.generators.parts import Camera, Light, Mesh, Room, Texture
+
+
+PANORAMA = "textures/environment.exr"  # what lies outside the windows
 
 
 def write_room(
@@ -48,7 +51,8 @@ def write_room(
         if isinstance(surface.reflectance, Texture):
             image = Image.fromarray(surface.reflectance.pixels)
             image.save(folder / "textures" / f"{surface.name}.png", compress_level=2)
-    scene = scene_element(room, max_depth=max_depth, resolution=resolution, spp=spp)
+    outside = write_panorama(room.environment, folder, PANORAMA)
+    scene = scene_element(room, outside, max_depth=max_depth, resolution=resolution, spp=spp)
     indent(scene, "  ")
     ElementTree(scene).write(folder / "scene.xml", encoding="utf-8", xml_declaration=True)
     write_glb(room, folder)
@@ -80,8 +84,13 @@ def write_ply(mesh: Mesh, path: Path, *, tile: tuple[float, float] = (1.0, 1.0))
     path.write_bytes("\n".join(lines).encode("ascii") + vertices.tobytes() + faces.tobytes())
 
 
-def scene_element(room: Room, *, max_depth: int, resolution: tuple[int, int], spp: int) -> Element:
-    """The `<scene>` of a room, with file names relative to its folder; see `write_room`."""
+def scene_element(
+    room: Room, outside: Element | None, *, max_depth: int, resolution: tuple[int, int], spp: int
+) -> Element:
+    """The `<scene>` of a room, with file names relative to its folder; outside: its environment emitter.
+
+    See `write_room`.
+    """
     scene = Element("scene", version="3.0.0")
     integrator = SubElement(scene, "integrator", type="path")
     SubElement(integrator, "integer", name="max_depth", value=str(max_depth))
@@ -97,7 +106,6 @@ def scene_element(room: Room, *, max_depth: int, resolution: tuple[int, int], sp
             SubElement(shape, "ref", id=material_name)
     for light in room.lights:
         scene.append(_emitter(light))
-    outside = environment_xml(room.environment)
     if outside is not None:
         # Lamps outnumber the sky, which would leave it few samples; half of them suit both.
         SubElement(outside, "float", name="sampling_weight", value=str(max(1, len(room.lights))))

@@ -31,20 +31,22 @@ class View:
     seen: frozenset[int]
 
 
-def camera_rays(camera: Camera, grid: tuple[int, int] = GRID) -> FloatArray:
-    """(columns · rows, 3) unit directions through the centres of a grid over the view, row by row from the top."""
-    forward = np.subtract(camera.target, camera.position)
-    forward /= np.linalg.norm(forward)
+def camera_rays(cameras: Sequence[Camera], grid: tuple[int, int] = GRID) -> FloatArray:
+    """(cameras, columns · rows, 3) unit directions through the centres of a grid over each view, row by row from the top."""
+    forward = np.array([np.subtract(camera.target, camera.position) for camera in cameras])
+    forward /= np.linalg.norm(forward, axis=1, keepdims=True)
     right = np.cross(forward, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
+    right /= np.linalg.norm(right, axis=1, keepdims=True)
     up = np.cross(right, forward)
     columns, rows = grid
-    reach = np.tan(camera.fov / 2)
+    reach = np.tan(np.array([camera.fov for camera in cameras]) / 2)[:, None]
     x = ((np.arange(columns) + 0.5) / columns * 2 - 1) * reach
     y = (1 - (np.arange(rows) + 0.5) / rows * 2) * reach * rows / columns
-    rays = forward + y[:, None, None] * up + x[None, :, None] * right
-    rays = rays.reshape(-1, 3)
-    return rays / np.linalg.norm(rays, axis=1, keepdims=True)
+    across = x[:, None, :, None] * right[:, None, None]
+    rays = forward[:, None, None] + y[:, :, None, None] * up[:, None, None] + across
+    # In a frame of unit vectors the length follows from where a ray meets the image plane.
+    rays /= np.sqrt(1 + x[:, None, :] ** 2 + y[:, :, None] ** 2)[..., None]
+    return rays.reshape(len(cameras), -1, 3)
 
 
 def judge(caster: RayCaster, cameras: Sequence[Camera], shell_owners: int) -> list[View]:
@@ -52,10 +54,10 @@ def judge(caster: RayCaster, cameras: Sequence[Camera], shell_owners: int) -> li
 
     shell_owners: owners below this number are the shell's and do not count as things seen.
     """
-    rays = [camera_rays(camera) for camera in cameras]
-    count = len(rays[0])
+    rays = camera_rays(cameras)
+    count = rays.shape[1]
     origins = np.repeat([camera.position for camera in cameras], count, axis=0)
-    distance, owner = caster.cast(origins, np.concatenate(rays))
+    distance, owner = caster.cast(origins, rays.reshape(-1, 3))
     shape = (len(cameras), count)
     return [
         _judge_one(camera, d, o, shell_owners)

@@ -8,26 +8,29 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gibench.generators.parts import FloatArray, Mesh
+from gibench.generators.parts import FloatArray, IntArray, Mesh
 from gibench.rendering.backend import select_variant
+
+Surface = tuple[FloatArray, IntArray]  # vertices (V, 3), metres, and faces (F, 3)
 
 
 class RayCaster:
-    """Casts rays at a list of meshes, under Mitsuba's current variant (or the best one where none is current).
+    """Casts rays at a list of surfaces, under Mitsuba's current variant (or the best one where none is current).
 
-    All meshes go into one Mitsuba shape, and the triangle that was hit tells the owner: one shape builds faster
+    All surfaces go into one Mitsuba shape, and the triangle that was hit tells the owner: one shape builds faster
     than hundreds, and its kernel is compiled once for all rooms.
     """
 
-    def __init__(self, meshes: Sequence[Mesh], owners: Sequence[int]) -> None:
-        """meshes: world space. owners: what `cast` answers for each of them, ≥ 0."""
+    def __init__(self, surfaces: Sequence[Mesh | Surface], owners: Sequence[int]) -> None:
+        """surfaces: world space. owners: what `cast` answers for each of them, ≥ 0."""
         select_variant()
         import mitsuba as mi
 
-        starts = np.cumsum([0, *(len(m.vertices) for m in meshes)])
-        vertices = np.concatenate([m.vertices for m in meshes]).astype(np.float32)
-        faces = np.concatenate([m.faces + s for m, s in zip(meshes, starts, strict=False)]).astype(np.uint32)
-        self._owner = np.repeat(np.asarray(owners), [len(m.faces) for m in meshes])
+        bare = [(s.vertices, s.faces) if isinstance(s, Mesh) else s for s in surfaces]
+        starts = np.cumsum([0, *(len(v) for v, _ in bare)])
+        vertices = np.concatenate([v for v, _ in bare]).astype(np.float32)
+        faces = np.concatenate([f + s for (_, f), s in zip(bare, starts, strict=False)]).astype(np.uint32)
+        self._owner = np.repeat(np.asarray(owners), [len(f) for _, f in bare])
         shape = mi.Mesh("room", len(vertices), len(faces))
         parameters = mi.traverse(shape)
         parameters["vertex_positions"] = vertices.ravel()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gibench.errors import GibenchError
 from gibench.rendering.backend import is_scalar, select_variant
+from gibench.rendering.kernel_sharing import spare_plugins
 
 
 class SceneError(GibenchError):
@@ -32,6 +33,7 @@ class Scene:
     shapes: tuple[str, ...]
     _material_of: dict[int, int]
     _shape_of: dict[int, int]
+    _beside: tuple[Any, ...] = ()  # what must live as long as the scene
 
     @cached_property
     def _tables(self) -> tuple[Any, Any]:
@@ -105,8 +107,10 @@ def load_dict(description: dict[str, Any]) -> Scene:
     return wrap(mi.load_dict(description, optimize=False))
 
 
-def load_scene(path: str | Path) -> Scene:
+def load_scene(path: str | Path, *, share_kernels: bool = False) -> Scene:
     """A scene from a Mitsuba 3 XML file. Selects a variant where none is current.
+
+    share_kernels: for one of many rooms, so that the next need not be compiled again; see `kernel_sharing`.
 
     Raises SceneError where the file is missing or Mitsuba refuses it, with its reason.
     """
@@ -117,10 +121,11 @@ def load_scene(path: str | Path) -> Scene:
         raise SceneError(f"there is no scene file {path}")
     try:
         # Mitsuba would merge shapes that share a material, and their ids with them.
-        return wrap(mi.load_file(str(path), optimize=False))
+        scene = wrap(mi.load_file(str(path), optimize=False))
     except RuntimeError as error:
         reason = " ".join(str(error).split())
         raise SceneError(f"Mitsuba refuses {path}: {reason}") from error
+    return replace(scene, _beside=spare_plugins()) if share_kernels else scene
 
 
 def cast_rays(scene: Scene, origins: ArrayLike, directions: ArrayLike) -> dict[str, NDArray[Any]]:

@@ -143,6 +143,15 @@ def test_doctor_says_what_it_found(capsys):
     assert all(len(line) <= 80 for line in said.splitlines() if line not in paths)
 
 
+def test_doctor_keeps_the_commands_that_mend_in_one_piece(monkeypatch, capsys, tmp_path):
+    monkeypatch.setenv("GIBENCH_CACHE", str(tmp_path))
+    assert run(app, ["doctor"]) == 0
+    said = capsys.readouterr().out
+    assert "LPIPS weights missing\n" in said
+    assert "the LPIPS weights are missing, which only LPIPS needs:\n" in said
+    assert " " * 14 + "python -m gibench.metrics.lpips_weights\n" in said
+
+
 def test_doctor_for_programs(capsys):
     assert run(app, ["doctor", "--json"]) == 0
     facts = json.loads(capsys.readouterr().out)

@@ -148,3 +148,25 @@ def fake_work(root: Path, recipe: Recipe, **setup: Any) -> Work:
 def tiny(rooms: int = 3, **changes: Any) -> Recipe:
     values = {"rooms": rooms, "views": 2, "resolution": (16, 12), "spp": 4, "denoise": False}
     return Recipe.model_validate(values | changes)
+
+
+@dataclass(frozen=True)
+class Pids:
+    """Work that does nothing: the setup answers the worker's process, the job takes `seconds`."""
+
+    seconds: float = 0.0
+
+    def __call__(self, room: int | None = None, report: Report | None = None) -> int:
+        if room:
+            time.sleep(self.seconds)
+        return os.getpid()
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A setup or job that gives the same answer every time."""
+
+    answer: Any
+
+    def __call__(self, *_: Any) -> Any:
+        return self.answer

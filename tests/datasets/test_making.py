@@ -19,7 +19,7 @@ from gibench.datasets.loading import open_dataset
 from gibench.datasets.making import Progress, make
 from gibench.datasets.manifest import COLUMNS, read_manifest
 from gibench.datasets.verifying import verify
-from tests.datasets.fakes import FACTS, Broken, Killed, Setup, fake_work, tiny
+from tests.datasets.fakes import FACTS, Broken, Killed, Pids, Setup, fake_work, tiny
 
 
 def make_fake(root: Path, recipe=None, *, workers=1, work=None, **setup):
@@ -196,6 +196,39 @@ def test_what_fails_in_a_room_is_named_and_the_rest_stays_valid(undisturbed, tmp
     assert "\n" not in str(caught.value)
     assert {p.file for p in verify(root)} == {"dataset.json", "rooms/000001", "rooms/000002"}
     assert not list((root / "rooms").glob(".*"))
+
+
+def killed_and_gone(pid: int) -> None:
+    """Kill a worker; returns when its end of the pipe is closed."""
+    os.kill(pid, signal.SIGKILL)
+    os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)
+
+
+def test_a_worker_that_dies_before_it_is_handed_its_room_costs_nothing():
+    done, pids = [], []
+
+    def ready(pid: int) -> None:
+        pids.append(pid)
+        if len(pids) == 1:
+            killed_and_gone(pid)
+
+    listener = pool.Listener(ready, lambda *_: None, lambda room, pid: done.append(room), lambda room: None)
+    pool.run_rooms(pool.Work(Pids(), Pids()), [0, 1], listener)
+    assert done == [0, 1]
+    assert len(pids) == 2
+
+
+def test_a_worker_that_dies_with_nothing_to_do_stops_nobody():
+    done, pids = [], []
+
+    def one_done(room: int, pid: int) -> None:
+        done.append(room)
+        if len(done) == 1:
+            killed_and_gone(pid)  # room 0 is done, nothing is left, and room 1 goes on elsewhere
+
+    listener = pool.Listener(pids.append, lambda *_: None, one_done, lambda room: None)
+    pool.run_rooms(pool.Work(Pids(), Pids(seconds=1.5)), [0, 1], listener, workers=2)
+    assert sorted(done) == [0, 1]
 
 
 def test_a_worker_that_cannot_start_leaves_nothing_behind(tmp_path):

@@ -126,7 +126,7 @@ def test_an_environment_that_is_not_finite_is_refused_before_anything_is_made(tm
     sky = np.full((8, 16), np.nan, np.float32)
     OpenEXR.File({}, {"R": sky, "G": sky, "B": sky}).write(str(tmp_path / "sky.exr"))
     (tmp_path / "mine.toml").write_text('rooms = 1\nenvironment = "sky.exr"\n')
-    assert run(make_app, ["--recipe", str(tmp_path / "mine.toml"), "--out", str(tmp_path / "d")]) == 1
+    assert run(make_app, ["--recipe", str(tmp_path / "mine.toml"), "--out", str(tmp_path / "d")]) == 2
     said = capfd.readouterr().err
-    assert re.search(r"error: hdr .*sky\.exr: \d+ values are negative or not finite", said)
+    assert re.search(r"error: environment: hdr .*sky\.exr: \d+ values are negative or not finite", said)
     assert not (tmp_path / "d").exists()

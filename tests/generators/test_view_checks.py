@@ -32,7 +32,7 @@ def reason(distance, owner, shell_owners=2):
 
 
 def test_rays_span_the_field_of_view():
-    rays = camera_rays(EAST, (400, 300))
+    rays = camera_rays([EAST], (400, 300))[0]
     np.testing.assert_allclose(np.linalg.norm(rays, axis=1), 1)
     grid = rays.reshape(300, 400, 3)
     across = np.degrees(np.arctan2(-grid[150, :, 1], grid[150, :, 0]))

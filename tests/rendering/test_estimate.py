@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from gibench.rendering import estimate as module
+from gibench.rendering.backend import is_scalar
 from gibench.rendering.estimate import EstimateError, estimate_radiance, group_levels
 from gibench.rendering.render import render_frame
-from gibench.rendering.scene import load_dict
+from gibench.rendering.scene import load_dict, load_scene
 
 from . import scenes
 
@@ -111,3 +112,43 @@ def test_one_sample_has_no_standard_error(room):
     assert render_frame(room, scenes.CAMERA, resolution=(4, 4), channels=["color"], spp=1).spp == 1
     with pytest.raises(EstimateError, match="color_se"):
         render_frame(room, scenes.CAMERA, resolution=(4, 4), channels=["color_se"], spp=1)
+
+
+@pytest.fixture
+def rooms_on_disk(tmp_path):
+    """Two scenes of one lamp each, with different numbers and kinds of shapes and materials."""
+    kinds = (
+        '<bsdf type="roughplastic"><string name="distribution" value="ggx"/>'
+        '<rgb name="diffuse_reflectance" value="0.2 0.3 0.4"/></bsdf>',
+        '<bsdf type="diffuse"><rgb name="reflectance" value="0.5 0.6 0.4"/></bsdf>',
+    )
+    for name, shapes in (("one", 1), ("two", 5)):
+        text = "".join(
+            f'<shape type="sphere"><point name="center" x="{i}" y="0" z="1"/><float name="radius" value="0.4"/>'
+            f'<bsdf type="twosided">{kinds[i % 2]}</bsdf></shape>'
+            for i in range(shapes)
+        )
+        lamp = '<shape type="sphere"><point name="center" x="0" y="0" z="3"/><emitter type="area"/></shape>'
+        (tmp_path / f"{name}.xml").write_text(f'<scene version="3.0.0">{text}{lamp}</scene>')
+    return tmp_path / "one.xml", tmp_path / "two.xml"
+
+
+def test_scenes_share_a_compiled_kernel_and_keep_their_pixels(rooms_on_disk):
+    if is_scalar():
+        pytest.skip("nothing is compiled")
+    import drjit as dr
+
+    options = {"resolution": (16, 12), "channels": ["radiance", "surface"], "spp": 4}
+    tracers = []
+    for path in rooms_on_disk:
+        alone = render_frame(load_scene(path), scenes.CAMERA, **options).arrays
+        shared = load_scene(path, share_kernels=True)
+        with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+            dr.kernel_history_clear()
+            frame = render_frame(shared, scenes.CAMERA, **options).arrays
+            kernels = [k for k in dr.kernel_history() if "operation_count" in k]
+        tracers.append(max(kernels, key=lambda k: k["operation_count"])["hash"])
+        for name, values in alone.items():
+            np.testing.assert_array_equal(values, frame[name])
+        del shared
+    assert tracers[0] == tracers[1]

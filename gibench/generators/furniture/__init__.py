@@ -12,6 +12,7 @@ import importlib
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -111,8 +112,13 @@ def _family(name: str) -> Family:
     return FAMILIES[name]
 
 
+@lru_cache(maxsize=None)
+def _parameters(family: Family) -> tuple[str, ...]:
+    return tuple(inspect.signature(family.build).parameters)
+
+
 def _only_known(family: Family, given: Mapping[str, Any], *, complete: bool) -> None:
-    known = inspect.signature(family.build).parameters
+    known = _parameters(family)
     unknown = [name for name in given if name not in known]
     missing = [name for name in known if complete and name not in given]
     if unknown or missing:

@@ -10,10 +10,8 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
-from gibench.generators.parts import FloatArray, Furniture
+from gibench.generators.parts import FloatArray, Furniture, IntArray
 from gibench.generators.poses import turn
 
 MERGED = 1e5  # vertices closer than 1 / MERGED metres are the same corner
@@ -39,22 +37,29 @@ def component_boxes(furniture: Furniture) -> FloatArray:
     """(N, 7) a box for each closed surface of a piece: the top of a table apart from its legs; not to be written to."""
     lows, highs = [], []
     for part in furniture.parts:
-        vertices, faces = part.mesh.vertices, part.mesh.faces
-        # Corners are split where normals jump; merged by place, what is connected is one closed surface.
-        cells = np.round(vertices * MERGED).astype(np.int64)
-        _, same = np.unique(cells @ np.array([1, 1 << 21, 1 << 42]), return_inverse=True)
-        links = same[faces]
-        ones = np.ones(2 * len(links), dtype=np.int8)
-        pairs = (np.concatenate([links[:, 0], links[:, 1]]), np.concatenate([links[:, 1], links[:, 2]]))
-        graph = coo_array((ones, pairs), shape=(same.max() + 1,) * 2)
-        count, label = connected_components(graph, directed=False)
-        of_vertex = label[same]
-        low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
-        np.minimum.at(low, of_vertex, vertices)
-        np.maximum.at(high, of_vertex, vertices)
-        lows.append(low)
-        highs.append(high)
+        vertices = part.mesh.vertices
+        starts = _component_starts(vertices, part.mesh.faces)
+        lows.append(np.minimum.reduceat(vertices, starts))
+        highs.append(np.maximum.reduceat(vertices, starts))
     return _boxes(np.concatenate(lows), np.concatenate(highs))
+
+
+def _component_starts(vertices: FloatArray, faces: IntArray) -> NDArray[np.intp]:
+    """The first vertex of every closed surface, for surfaces whose vertices follow each other, as merging leaves them.
+
+    Surfaces that are interleaved count as one.
+    """
+    # Corners are split where normals jump: those at the same place belong together like those of a triangle.
+    cells = np.round(vertices * MERGED).astype(np.int64) @ np.array([1, 1 << 21, 1 << 42])
+    order = np.argsort(cells)
+    twins = np.flatnonzero(cells[order[1:]] == cells[order[:-1]])
+    one, other = order[twins], order[twins + 1]
+    first = np.concatenate([faces.min(1), np.minimum(one, other)])
+    last = np.concatenate([faces.max(1), np.maximum(one, other)])
+    # A surface starts where no link passes over.
+    size = len(vertices) + 1
+    passing = np.cumsum(np.bincount(first + 1, minlength=size) - np.bincount(last + 1, minlength=size))
+    return np.flatnonzero(passing[:-1] == 0)
 
 
 def _boxes(low: FloatArray, high: FloatArray) -> FloatArray:
@@ -104,11 +109,15 @@ def overlap(a: FloatArray, b: FloatArray) -> NDArray[np.bool_]:
 
 def meets_any(a: FloatArray, b: FloatArray) -> bool:
     """Whether any box of a shares volume with any of b; fast where most of b is far away."""
-    reach = np.hypot(a[:, 2], a[:, 3])
-    low, high = (a[:, :2] - reach[:, None]).min(0), (a[:, :2] + reach[:, None]).max(0)
-    reach = np.hypot(b[:, 2], b[:, 3])[:, None]
-    near = ((b[:, :2] + reach > low) & (b[:, :2] - reach < high)).all(1)
-    near &= (b[:, 5] < a[:, 6].max()) & (b[:, 6] > a[:, 5].min())
+    if len(b) == 0:
+        return False
+    x, y, half_x, half_y, _, bottom, top = a.T
+    reach = np.hypot(half_x, half_y)
+    other_x, other_y, other_half_x, other_half_y, _, other_bottom, other_top = b.T
+    near = (other_bottom < top.max()) & (other_top > bottom.min())
+    other_reach = np.hypot(other_half_x, other_half_y)
+    near &= (other_x + other_reach > (x - reach).min()) & (other_x - other_reach < (x + reach).max())
+    near &= (other_y + other_reach > (y - reach).min()) & (other_y - other_reach < (y + reach).max())
     return bool(near.any()) and bool(overlap(a, b[near]).any())
 
 
@@ -117,3 +126,20 @@ def rectangle(
 ) -> FloatArray:
     """(1, 7) one box."""
     return np.array([[x, y, half_x, half_y, yaw, z0, z1]])
+
+
+# The corners of a box are its ground corners, counter-clockwise, at the bottom and then at the top.
+_BOX_FACES = np.array(
+    [[0, 2, 1], [0, 3, 2], [4, 5, 6], [4, 6, 7]]
+    + [t for a, b in ((0, 1), (1, 2), (2, 3), (3, 0)) for t in ([a, b, b + 4], [a, b + 4, a + 4])],
+    np.int32,
+)
+
+
+def triangles(boxes: FloatArray) -> tuple[FloatArray, IntArray]:
+    """The boxes as one surface: vertices (8 N, 3) and faces (12 N, 3), counter-clockwise seen from outside."""
+    vertices = np.empty((len(boxes), 2, 4, 3))
+    vertices[..., :2] = corners(boxes)[:, None]
+    vertices[..., 2] = boxes[:, 5:, None]
+    starts = 8 * np.arange(len(boxes), dtype=np.int32)
+    return vertices.reshape(-1, 3), (_BOX_FACES + starts[:, None, None]).reshape(-1, 3)

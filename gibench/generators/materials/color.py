@@ -102,19 +102,31 @@ def colorize(index: NDArray[np.integer], palette: ArrayLike, luminance: float) -
     palette = np.asarray(palette, np.float64)
     weight = np.bincount(index.ravel(), minlength=len(palette)) / index.size
     shade = luminance_of(palette)
+    scale = _scale(shade, weight, luminance)
+    colors = np.zeros((len(palette), 4), np.uint8)
+    colors[:, :3] = encode(fit_range(scale * palette))
+    # Gathering whole 32-bit words is several times faster than gathering triples of bytes.
+    return np.ascontiguousarray(
+        np.take(colors.view(np.uint32)[:, 0], index).view(np.uint8).reshape(*index.shape, 4)[..., :3]
+    )
+
+
+def _scale(shades: FloatArray, weights: FloatArray, luminance: float) -> float:
+    """What to multiply luminances (K,) with, so that, clipped, they have a given mean under weights that sum to 1."""
+    used = weights > 0
+    shades, weights = shades[used], weights[used]
+    scale = luminance / max(float(weights @ shades), 1e-9)
+    if DARKEST <= scale * shades.min() and scale * shades.max() <= LIGHTEST:
+        return scale
     low, high = np.log(1e-3), np.log(1e3)
     for _ in range(40):  # bisection: the mean of the clipped luminances grows with the scale
         middle = 0.5 * (low + high)
-        if weight @ np.clip(np.exp(middle) * shade, DARKEST, LIGHTEST) < luminance:
+        clipped = np.minimum(np.maximum(np.exp(middle) * shades, DARKEST), LIGHTEST)
+        if weights @ clipped < luminance:
             low = middle
         else:
             high = middle
-    colors = np.zeros((len(palette), 4), np.uint8)
-    colors[:, :3] = encode(fit_range(np.exp(0.5 * (low + high)) * palette))
-    # Gathering whole 32-bit words is several times faster than gathering triples of bytes.
-    return np.ascontiguousarray(
-        colors.view(np.uint32)[:, 0][index].view(np.uint8).reshape(*index.shape, 4)[..., :3]
-    )
+    return float(np.exp(0.5 * (low + high)))
 
 
 def ramp(stops: ArrayLike, steps: int) -> FloatArray:

@@ -6,7 +6,6 @@ from functools import lru_cache
 
 import numpy as np
 import scipy.fft
-import scipy.special
 from numpy.typing import NDArray
 
 Map = NDArray[np.float32]
@@ -28,10 +27,14 @@ def band_noise(
     them).
     """
     amplitude = _filter(shape, cycles, width, slope)
-    spectrum = rng.standard_normal((*amplitude.shape, 2), dtype=np.float32).view(np.complex64)[..., 0]
+    # A texel sums thousands of coefficients, so even coarse uniform ones give Gaussian noise; bytes are drawn fastest.
+    coefficients = np.frombuffer(rng.bytes(2 * amplitude.size), np.int8).astype(np.float32)
+    coefficients += np.float32(0.5)
+    spectrum = coefficients.view(np.complex64).reshape(amplitude.shape)
     spectrum *= amplitude
     field = scipy.fft.irfft2(spectrum, s=shape, overwrite_x=True)
-    field /= max(float(field.std()), 1e-12)
+    # The mean is zero, for the constant term is.
+    field *= 1 / max(float(np.sqrt(np.vdot(field, field) / field.size)), 1e-12)
     return field
 
 
@@ -55,7 +58,10 @@ def _filter(shape: tuple[int, int], cycles: tuple[float, float], width: float, s
 
 def uniform(field: Map) -> Map:
     """Turn zero-mean, unit-variance Gaussian noise into noise spread evenly over [0, 1]."""
-    return scipy.special.ndtr(field).astype(np.float32)
+    # The normal distribution function to 3e-4, several times faster than to the last bit.
+    # E. Page, "Approximations to the cumulative normal function", Applied Statistics 26, 1977, p. 75.
+    odd = field * (1 + np.float32(0.044715) * (field * field))
+    return 0.5 + 0.5 * np.tanh(np.float32(np.sqrt(2 / np.pi)) * odd)
 
 
 def white(rng: np.random.Generator, shape: tuple[int, int]) -> Map:

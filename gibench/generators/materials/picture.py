@@ -14,7 +14,7 @@ from gibench.generators.materials.roles import Role, draw, draw_hue, draw_seed
 from gibench.generators.materials.surface import build_with, check_luminance, dielectric
 from gibench.generators.parts import Material
 
-_PIXELS = 192
+_PIXELS = 160
 _INKS = 8
 _STEPS = 24
 

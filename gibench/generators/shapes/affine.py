@@ -79,6 +79,8 @@ def merge(meshes: Sequence[Mesh]) -> Mesh:
     """One mesh that holds all the given ones. Raises ShapeError if there is none."""
     if not meshes:
         raise ShapeError("merge: no mesh was given; give at least one")
+    if len(meshes) == 1:
+        return meshes[0]
     starts = np.cumsum([0, *(len(m.vertices) for m in meshes[:-1])])
     return Mesh(
         np.concatenate([m.vertices for m in meshes]),
