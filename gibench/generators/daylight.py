@@ -207,15 +207,8 @@ def _irradiance(path: str, modified: int, size: int) -> float:
 
 def read_panorama(path: str) -> NDArray[np.float64]:
     """(H, W, 3) linear RGB of a panorama that holds only finite values ≥ 0. Raises BadEnvironment."""
-    from gibench.rendering.backend import select_variant
-
-    select_variant()  # before Mitsuba is loaded, so that it finds the right LLVM
-    import mitsuba
-
     try:
-        image = np.array(
-            mitsuba.Bitmap(path).convert(mitsuba.Bitmap.PixelFormat.RGB, mitsuba.Struct.Type.Float32)
-        )
+        image = _read_exr(path) if path.lower().endswith(".exr") else _read_hdr(path)
     except Exception as error:  # what Mitsuba raises for a file that is no image differs by format
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise BadEnvironment(f"hdr {path}: not readable as an .hdr or .exr image ({reason})") from error
@@ -227,3 +220,21 @@ def read_panorama(path: str) -> NDArray[np.float64]:
             f"hdr {path}: {broken} values are negative or not finite; mend the file or use another"
         )
     return image.astype(np.float64)
+
+
+def _read_hdr(path: str) -> NDArray[np.float32]:
+    from gibench.rendering.backend import select_variant
+
+    select_variant()  # before Mitsuba is loaded, so that it finds the right LLVM
+    import mitsuba as mi
+
+    return np.array(mi.Bitmap(path).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32))
+
+
+def _read_exr(path: str) -> NDArray[np.float32]:
+    # Mitsuba's reader of OpenEXR never returns in a process that may use one thread only.
+    import OpenEXR
+
+    with OpenEXR.File(path, separate_channels=True) as file:
+        channels = file.channels()
+        return np.stack([channels[name].pixels for name in "RGB"], axis=-1).astype(np.float32)

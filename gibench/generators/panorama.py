@@ -26,13 +26,6 @@ SUN_RADIUS = math.radians(0.5338 / 2)
 SUBSAMPLES = 24
 """Samples along each side of a texel that the sun may touch."""
 
-LARGEST_HALF = 6e4
-"""Largest stored value, a little below what float16 holds."""
-
-SCALE = 64.0
-"""Radiance of a stored 1. Stored values then reach a full sun's 1.7e6 and keep 3 digits down to 0.004. The same for
-nearly all rooms, since it becomes a constant of the compiled kernel."""
-
 
 def panorama(environment: Environment) -> NDArray[np.float32]:
     """Radiance from all directions, W·m⁻²·sr⁻¹, linear Rec. 709: (H, 2·H, 3) float32 with the zenith on top.
@@ -63,23 +56,18 @@ def panorama(environment: Environment) -> NDArray[np.float32]:
 
 
 def write_panorama(environment: Environment, folder: Path, name: str) -> Element | None:
-    """Write the panorama of an environment as `name`, an EXR below `folder`; returns its `<emitter>`.
+    """Write the panorama of an environment as `name`, an .hdr below `folder`; returns its `<emitter>`.
 
-    None, and no file, for the kind "none". Values are stored as float16 and scaled by the emitter, since the sun
-    exceeds what float16 holds.
+    None, and no file, for the kind "none". RGBE has room for the sun and keeps 8 bits of each value. (Mitsuba's reader
+    of OpenEXR never returns in a process that may use one thread only.)
     """
     if environment.kind == "none":
         return None
     import mitsuba as mi
 
-    image = panorama(environment)
-    scale = SCALE
-    while image.max() > LARGEST_HALF * scale:
-        scale *= SCALE
-    mi.Bitmap((image / scale).astype(np.float16)).write(str(folder / name))
+    mi.Bitmap(panorama(environment)).write(str(folder / name))
     emitter = Element("emitter", type="envmap", id="environment")
     SubElement(emitter, "string", name="filename", value=name)
-    SubElement(emitter, "float", name="scale", value=repr(scale))
     to_world = SubElement(emitter, "transform", name="to_world")
     SubElement(to_world, "rotate", x="1", angle="90")  # Mitsuba's panoramas have Y up
     rotation = float(environment.parameters.get("rotation", 0.0))

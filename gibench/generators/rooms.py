@@ -189,7 +189,7 @@ def _caster(plan: Plan) -> RayCaster:
 
 
 def _solid(thing: Placed) -> FloatArray:
-    """(N, 7) boxes that show what a thing hides: one for a small thing, else one for each surface but the small ones."""
+    """(N, 7) boxes that hide what a thing hides: one for a small thing, else one for each larger surface."""
     low, high = bounds_of(thing.furniture)
     if (high - low).max() < SMALL:
         return moved(whole_box(thing.furniture), thing.position, thing.yaw)

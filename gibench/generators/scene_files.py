@@ -22,8 +22,7 @@ from gibench.generators.outside import GROUND, ground_element
 from gibench.generators.panorama import write_panorama
 from gibench.generators.parts import Camera, Light, Mesh, Room, Texture
 
-
-PANORAMA = "textures/environment.exr"  # what lies outside the windows
+PANORAMA = "textures/environment.hdr"  # what lies outside the windows
 
 
 def write_room(

@@ -32,7 +32,7 @@ class View:
 
 
 def camera_rays(cameras: Sequence[Camera], grid: tuple[int, int] = GRID) -> FloatArray:
-    """(cameras, columns · rows, 3) unit directions through the centres of a grid over each view, row by row from the top."""
+    """(cameras, columns · rows, 3) unit directions through a grid over each view, row by row from the top."""
     forward = np.array([np.subtract(camera.target, camera.position) for camera in cameras])
     forward /= np.linalg.norm(forward, axis=1, keepdims=True)
     right = np.cross(forward, [0.0, 0.0, 1.0])

@@ -99,73 +99,73 @@ class Estimate:
         return float(np.median(self.standard_error.mean(axis=1)[bright] / color[bright]))
 
 
+@dataclass(frozen=True)
+class _Block:
+    """A run of pixels in row order, and what is to be traced through each of them."""
+
+    width: int
+    first_pixel: int
+    pixels: int
+    samples: int
+    levels: int
+    seed: int
+    max_depth: int
+    guides: bool
+
+
 def _launch(
-    scene: Scene,
-    generator: RayGenerator,
-    width: int,
-    first_pixel: int,
-    pixels: int,
-    samples: int,
-    levels: int,
-    seed: int,
-    max_depth: int,
-    guides: bool,
+    scene: Scene, generator: RayGenerator, block: _Block
 ) -> tuple[dict[str, NDArray[np.float32]], NDArray[np.float32], int]:
-    """Means over `samples` paths for each of `pixels` pixels; the groups' shares of that of color; invalid paths."""
+    """Means over the samples of each pixel; the groups' shares of that of color; how many paths were invalid."""
     import drjit as dr
     import mitsuba as mi
 
     from gibench.rendering.integrator import trace_paths
     from gibench.rendering.sampling import StratifiedSampler
 
-    lanes = pixels * samples
-    sampler = StratifiedSampler(seed, lanes, levels)
-    pixel = dr.arange(mi.UInt32, lanes) // dr.opaque(mi.UInt32, samples) + dr.opaque(mi.UInt32, first_pixel)
-    row = pixel // dr.opaque(mi.UInt32, width)
-    corner = mi.Point2f(mi.Float(pixel - row * dr.opaque(mi.UInt32, width)), mi.Float(row))
+    lanes = block.pixels * block.samples
+    sampler = StratifiedSampler(block.seed, lanes, block.levels)
+    pixel = dr.arange(mi.UInt32, lanes) // dr.opaque(mi.UInt32, block.samples) + dr.opaque(
+        mi.UInt32, block.first_pixel
+    )
+    row = pixel // dr.opaque(mi.UInt32, block.width)
+    corner = mi.Point2f(mi.Float(pixel - row * dr.opaque(mi.UInt32, block.width)), mi.Float(row))
     path = trace_paths(
         scene.mi_scene,
         sampler,
         generator.rays(corner + sampler.next_2d()),
-        max_depth=max_depth,
-        guides=guides,
+        max_depth=block.max_depth,
+        guides=block.guides,
     )
 
     parts = {name: getattr(path, name) for name in PARTS}
     color = sum(parts.values())
     finite = dr.all(dr.isfinite(color))
     # Divided before they are summed, so that huge radiance does not overflow on the way.
-    share = 1 / dr.opaque(mi.Float, samples)
+    share = 1 / dr.opaque(mi.Float, block.samples)
     parts = {name: dr.select(finite, value * share, 0) for name, value in parts.items()}
-    if guides:
+    if block.guides:
         parts |= {name: getattr(path, name) * share for name in GUIDES}
     invalid = dr.select(finite, mi.UInt32(0), mi.UInt32(1))
     # One kernel for all of it. A reduction of what is not evaluated yet would trace the paths once more.
     dr.eval(parts, invalid)
 
     color = sum(parts[name] for name in PARTS)
-    sums = {name: [dr.block_sum(c, samples) for c in value] for name, value in parts.items()}
-    groups = [dr.block_sum(c, 4**levels) for c in color]
+    sums = {name: [dr.block_sum(c, block.samples) for c in value] for name, value in parts.items()}
+    groups = [dr.block_sum(c, 4**block.levels) for c in color]
     count = dr.sum(invalid)
     dr.eval(sums, groups, count)
     return (
         {name: np.stack([np.array(c) for c in value], axis=-1) for name, value in sums.items()},
-        np.stack([np.array(c) for c in groups], axis=-1).reshape(pixels, samples // 4**levels, 3),
+        np.stack([np.array(c) for c in groups], axis=-1).reshape(
+            block.pixels, block.samples // 4**block.levels, 3
+        ),
         int(count[0]),
     )
 
 
 def _launch_scalar(
-    scene: Scene,
-    generator: RayGenerator,
-    width: int,
-    first_pixel: int,
-    pixels: int,
-    samples: int,
-    levels: int,
-    seed: int,
-    max_depth: int,
-    guides: bool,
+    scene: Scene, generator: RayGenerator, block: _Block
 ) -> tuple[dict[str, NDArray[np.float32]], NDArray[np.float32], int]:
     """The same one path at a time, for machines on which Dr.Jit compiles nothing."""
     import mitsuba as mi
@@ -174,20 +174,20 @@ def _launch_scalar(
     from gibench.rendering.sampling import IndependentSampler
 
     sampler = IndependentSampler()
-    names = [*PARTS, *(GUIDES if guides else ())]
-    values = np.zeros((len(names), pixels, samples, 3), dtype=np.float32)
-    for p in range(pixels):
-        sampler.seed((seed * 0x9E3779B1 + first_pixel + p) % 2**32)
-        corner = mi.Point2f((first_pixel + p) % width, (first_pixel + p) // width)
-        for s in range(samples):
+    names = [*PARTS, *(GUIDES if block.guides else ())]
+    values = np.zeros((len(names), block.pixels, block.samples, 3), dtype=np.float32)
+    for p in range(block.pixels):
+        sampler.seed((block.seed * 0x9E3779B1 + block.first_pixel + p) % 2**32)
+        corner = mi.Point2f((block.first_pixel + p) % block.width, (block.first_pixel + p) // block.width)
+        for s in range(block.samples):
             rays = generator.rays(corner + sampler.next_2d())
-            path = trace_paths(scene.mi_scene, sampler, rays, max_depth=max_depth, guides=guides)
+            path = trace_paths(scene.mi_scene, sampler, rays, max_depth=block.max_depth, guides=block.guides)
             values[:, p, s] = [np.array(getattr(path, name)) for name in names]
     finite = np.isfinite(values).all(axis=(0, -1))
     values[:, ~finite] = 0
-    values /= samples
+    values /= block.samples
     color = values[: len(PARTS)].sum(axis=0)
-    groups = color.reshape(pixels, samples // 4**levels, 4**levels, 3).sum(axis=2)
+    groups = color.reshape(block.pixels, block.samples // 4**block.levels, 4**block.levels, 3).sum(axis=2)
     return dict(zip(names, values.sum(axis=2), strict=True)), groups, int((~finite).sum())
 
 
@@ -205,28 +205,18 @@ def _add(
 
     launch = _launch_scalar if is_scalar() else _launch
     generator = RayGenerator(camera, resolution)
-    block = max(LANES // samples, 1)
+    pixels = max(LANES // samples, 1)
     added = samples // 4**estimate.levels
     total = estimate.groups + added
-    for first in range(0, estimate.pixels, block):
-        count = min(block, estimate.pixels - first)
+    for first in range(0, estimate.pixels, pixels):
+        count = min(pixels, estimate.pixels - first)
         where = slice(first, first + count)
         number = int(
             np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, first)).generate_state(1)[0]
         )
         start = time.perf_counter()
-        launched, groups, invalid = launch(
-            scene,
-            generator,
-            resolution[0],
-            first,
-            count,
-            samples,
-            estimate.levels,
-            number,
-            max_depth,
-            guides,
-        )
+        block = _Block(resolution[0], first, count, samples, estimate.levels, number, max_depth, guides)
+        launched, groups, invalid = launch(scene, generator, block)
         estimate.seconds += time.perf_counter() - start
         estimate.invalid += invalid
         for name, value in launched.items():

@@ -98,7 +98,7 @@ class Setup:
         modules = {
             "gibench.generators.rooms": {"sample_room": sampled, "RejectedRoom": RejectedRoom},
             "gibench.generators.scene_files": {"write_room": write_room},
-            "gibench.rendering.scene": {"load_scene": lambda path: scene},
+            "gibench.rendering.scene": {"load_scene": lambda path, share_kernels: scene},
             "gibench.rendering.render": {"render_frame": rendered},
         }
         for name, content in modules.items():

@@ -6,7 +6,9 @@ import pytest
 from gibench.datasets import loading, open_dataset
 from gibench.datasets.errors import DatasetError, StorageError, UnknownChannel
 from gibench.datasets.exr import decode
+from gibench.datasets.manifest import new_manifest, write_manifest
 from gibench.rendering.channels import CHANNELS
+from tests.datasets.fakes import FACTS, tiny
 
 
 def test_a_dataset_is_a_sequence_of_frames(rooms_made):
@@ -78,7 +80,7 @@ def test_what_ids_mean_and_where_a_room_lies(rooms_made):
 def test_folders_that_are_no_datasets_or_not_finished(tmp_path):
     with pytest.raises(DatasetError, match=r"is no dataset: it has no readable dataset\.json"):
         open_dataset(tmp_path)
-    (tmp_path / "dataset.json").write_text('{"format": 1, "command": "make-dataset --out x"}')
+    write_manifest(tmp_path, new_manifest(tiny(), FACTS, {}, "make-dataset --out x"))
     with pytest.raises(
         DatasetError, match=r"has no frames\.parquet.*to continue it run `make-dataset --out x`"
     ):

@@ -152,6 +152,9 @@ def test_a_damaged_manifest_is_named(tmp_path):
     (tmp_path / "dataset.json").write_text('{"format": 1')
     with pytest.raises(Exception, match=r"dataset\.json is damaged"):
         make_fake(tmp_path)
+    (tmp_path / "dataset.json").write_text('{"format": 1, "recipe": {"rooms": "many"}}')
+    with pytest.raises(Exception, match=r"dataset\.json is damaged"):
+        make_fake(tmp_path)
     (tmp_path / "dataset.json").write_text('{"format": 99, "versions": {"gibench": "9.9"}}')
     with pytest.raises(Exception, match=r"is of format 99.*install the gibench that made it \(9\.9\)"):
         make_fake(tmp_path)

@@ -29,7 +29,7 @@ def loaded(mi, element, folder):
 
 
 def written(mi, environment, folder):
-    return loaded(mi, write_panorama(environment, folder, "outside.exr"), folder)
+    return loaded(mi, write_panorama(environment, folder, "outside.hdr"), folder)
 
 
 def lux_of(image):
@@ -47,7 +47,9 @@ def test_the_sky_is_that_of_the_model(mi, tmp_path):
     directions = directions[directions[:, 2] > 0.02]
     seen = radiance(mi, written(mi, environment, tmp_path), directions)
     model = radiance(mi, loaded(mi, environment_xml(environment), tmp_path), directions)
-    np.testing.assert_allclose(seen, model, rtol=0.02)
+    # RGBE: an 8-bit mantissa under the exponent of the brightest channel, cut off; and 1 % for interpolation.
+    brightest = model.max(axis=1, keepdims=True)
+    assert (np.abs(seen - model) <= brightest / 128 + 0.01 * model).all()
 
 
 @pytest.mark.parametrize("degrees", [10, 45, 80])
@@ -81,5 +83,5 @@ def test_a_panorama_of_the_users_keeps_its_light_when_it_is_reduced(mi, tmp_path
 
 
 def test_nothing_outside_writes_nothing(tmp_path):
-    assert write_panorama(Environment(), tmp_path, "outside.exr") is None
+    assert write_panorama(Environment(), tmp_path, "outside.hdr") is None
     assert not list(tmp_path.iterdir())

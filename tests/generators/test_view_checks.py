@@ -48,6 +48,14 @@ def test_a_good_view_passes():
     assert view.objects == 8
 
 
+def test_rays_of_many_cameras_are_unit_and_each_its_own():
+    other = Camera((1.0, 2.0, 1.5), (0.0, 0.0, 1.0), 0.9)
+    rays = camera_rays([EAST, other])
+    np.testing.assert_allclose(np.linalg.norm(rays, axis=2), 1.0)
+    np.testing.assert_allclose(rays[1], camera_rays([other])[0])
+    assert not np.allclose(rays[0], rays[1])
+
+
 def test_many_candidates_are_judged_each_on_its_own():
     distance, owner = good_view()
     close = distance.copy()

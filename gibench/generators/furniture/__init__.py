@@ -12,7 +12,7 @@ import importlib
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -112,7 +112,7 @@ def _family(name: str) -> Family:
     return FAMILIES[name]
 
 
-@lru_cache(maxsize=None)
+@cache
 def _parameters(family: Family) -> tuple[str, ...]:
     return tuple(inspect.signature(family.build).parameters)
 

@@ -116,7 +116,7 @@ def _scale(shades: FloatArray, weights: FloatArray, luminance: float) -> float:
     used = weights > 0
     shades, weights = shades[used], weights[used]
     scale = luminance / max(float(weights @ shades), 1e-9)
-    if DARKEST <= scale * shades.min() and scale * shades.max() <= LIGHTEST:
+    if scale * shades.min() >= DARKEST and scale * shades.max() <= LIGHTEST:
         return scale
     low, high = np.log(1e-3), np.log(1e3)
     for _ in range(40):  # bisection: the mean of the clipped luminances grows with the scale

@@ -61,7 +61,8 @@ def uniform(field: Map) -> Map:
     # The normal distribution function to 3e-4, several times faster than to the last bit.
     # E. Page, "Approximations to the cumulative normal function", Applied Statistics 26, 1977, p. 75.
     odd = field * (1 + np.float32(0.044715) * (field * field))
-    return 0.5 + 0.5 * np.tanh(np.float32(np.sqrt(2 / np.pi)) * odd)
+    share: Map = np.tanh(np.float32(np.sqrt(2 / np.pi)) * odd)
+    return np.float32(0.5) * (share + np.float32(1))
 
 
 def white(rng: np.random.Generator, shape: tuple[int, int]) -> Map:

@@ -12,9 +12,10 @@ from gibench.generators.layouts.solids import (
     moved,
     overlap,
     rectangle,
+    triangles,
     whole_box,
 )
-from gibench.generators.parts import Furniture, Part
+from gibench.generators.parts import Furniture, Mesh, Part
 from gibench.generators.shapes import box, boxes, cylinder, merge
 from tests.generators.rooms_at_hand import inside, surface_points
 
@@ -100,3 +101,28 @@ def test_the_independent_inside_test_is_right():
     assert not found[out].any()
     skin = surface_points(rng, mesh.vertices, mesh.faces, 500, 0.001)
     assert inside(skin, mesh.vertices, mesh.faces).all()
+
+
+def test_interleaved_surfaces_share_a_box_and_others_do_not():
+    one, two = box(0, 1, 0, 1, 0, 1), box(3, 4, 0, 1, 0, 1)
+    together = merge([one, two])
+    rng = np.random.default_rng(3)
+    order = rng.permutation(len(together.vertices))
+    number = np.argsort(order).astype(np.int32)
+    shuffled = Mesh(
+        together.vertices[order], number[together.faces], together.normals[order], together.uvs[order]
+    )
+    for mesh, count in ((together, 2), (shuffled, 1)):
+        found = component_boxes(Furniture("box", {}, (Part(mesh, "wood"),)))
+        assert len(found) == count
+        low, high = (found[:, 0] - found[:, 2]).min(), (found[:, 0] + found[:, 2]).max()
+        assert (low, high) == pytest.approx((0, 4))
+
+
+def test_triangles_enclose_the_volume_of_the_boxes():
+    boxes_ = random_boxes(np.random.default_rng(4), 20)
+    vertices, faces = triangles(boxes_)
+    a, b, c = vertices[faces].transpose(1, 0, 2)
+    signed = np.einsum("ij,ij->i", a, np.cross(b, c)).reshape(len(boxes_), 12).sum(1) / 6
+    np.testing.assert_allclose(signed, 4 * boxes_[:, 2] * boxes_[:, 3] * (boxes_[:, 6] - boxes_[:, 5]))
+    np.testing.assert_allclose(vertices.reshape(-1, 2, 4, 3)[:, 0, :, :2], corners(boxes_))
