@@ -59,7 +59,7 @@ def write_panorama(environment: Environment, folder: Path, name: str) -> Element
     """Write the panorama of an environment as `name`, an .hdr below `folder`; returns its `<emitter>`.
 
     None, and no file, for the kind "none". RGBE has room for the sun and keeps 8 bits of each value. (Mitsuba's reader
-    of OpenEXR never returns in a process that may use one thread only.)
+    and writer of OpenEXR never return in a process that may use one thread only.)
     """
     if environment.kind == "none":
         return None

@@ -155,7 +155,7 @@ def select_variant(name: str = "auto") -> str:
     """Makes a Mitsuba variant current and returns its name.
 
     name: "auto" takes `cuda_ad_rgb` where a GPU works, else `llvm_ad_rgb`, else `scalar_rgb` with a warning
-    (it is several times slower); or one of VARIANTS. Repeated calls with what is already current cost nothing.
+    (it is many times slower); or one of VARIANTS. Repeated calls with what is already current cost nothing.
 
     Raises BackendError for an unknown name, or for a variant that cannot run here, with the reason.
     """

@@ -21,8 +21,9 @@ from gibench.rendering.camera import PinholeCamera, RayGenerator
 from gibench.rendering.channels import PARTS
 from gibench.rendering.scene import Scene
 
-LANES = 1 << 20
-"""Paths in flight at once: enough to fill a wide GPU, while memory stays the same for every spp and resolution."""
+LANES = 1 << 22
+"""Paths in flight at once, so that memory stays the same for every spp and resolution (about 0.5 GB). Every launch
+costs a quarter of a second of tracing Python, so a small frame of 64 samples is one launch."""
 
 MINIMUM_GROUPS = 16
 """With 16 groups the standard error is itself known to 1/√30 = 18 %."""
@@ -139,13 +140,14 @@ def _launch(
     )
 
     parts = {name: getattr(path, name) for name in PARTS}
-    color = sum(parts.values())
-    finite = dr.all(dr.isfinite(color))
+    finite = dr.all(dr.isfinite(sum(parts.values())))
+    if block.guides:
+        finite &= dr.all(dr.isfinite(path.albedo + path.normal))
     # Divided before they are summed, so that huge radiance does not overflow on the way.
     share = 1 / dr.opaque(mi.Float, block.samples)
     parts = {name: dr.select(finite, value * share, 0) for name, value in parts.items()}
     if block.guides:
-        parts |= {name: getattr(path, name) * share for name in GUIDES}
+        parts |= {name: dr.select(finite, getattr(path, name) * share, 0) for name in GUIDES}
     invalid = dr.select(finite, mi.UInt32(0), mi.UInt32(1))
     # One kernel for all of it. A reduction of what is not evaluated yet would trace the paths once more.
     dr.eval(parts, invalid)

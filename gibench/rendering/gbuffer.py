@@ -113,7 +113,9 @@ def _motion(
     width, height = resolution
     x, y, depth = previous.project(hit.si.p, resolution)
     ahead = hit.valid & (depth > 0)
-    offset = dr.select(ahead, mi.Vector2f(x, y) - pixel, 0)
+    offset = mi.Vector2f(x, y) - pixel
+    ahead &= dr.all(dr.isfinite(offset))
+    offset = dr.select(ahead, offset, 0)
     inside = ahead & (x >= 0) & (x < width) & (y >= 0) & (y < height)
     origin = mi.Point3f(list(previous.position))
     towards = hit.si.p - origin

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from gibench.errors import GibenchError
 from gibench.rendering.backend import is_scalar, select_variant
@@ -126,37 +125,3 @@ def load_scene(path: str | Path, *, share_kernels: bool = False) -> Scene:
         reason = " ".join(str(error).split())
         raise SceneError(f"Mitsuba refuses {path}: {reason}") from error
     return replace(scene, _beside=spare_plugins()) if share_kernels else scene
-
-
-def cast_rays(scene: Scene, origins: ArrayLike, directions: ArrayLike) -> dict[str, NDArray[Any]]:
-    """First hits of rays, for placing things and judging views.
-
-    origins, directions: (N, 3) metres; directions need no unit length. Returns distance (N,) float32 in metres
-    along the ray, 0 on a miss; shape_id (N,) uint32, 0 on a miss; normal (N, 3) float32, the geometric one.
-    """
-    import drjit as dr
-    import mitsuba as mi
-
-    start = np.ascontiguousarray(np.asarray(origins, dtype=np.float32).T)
-    towards = np.asarray(directions, dtype=np.float32)
-    towards = np.ascontiguousarray((towards / np.linalg.norm(towards, axis=1, keepdims=True)).T)
-    if is_scalar():
-        hits = [scene.mi_scene.ray_intersect(mi.Ray3f(o, d)) for o, d in zip(start.T, towards.T, strict=True)]
-        valid = np.array([h.is_valid() for h in hits])
-        return {
-            "distance": np.array(
-                [h.t if v else 0 for h, v in zip(hits, valid, strict=True)], dtype=np.float32
-            ),
-            "shape_id": np.array([scene.shape_ids(h.shape, h.is_valid()) for h in hits], dtype=np.uint32),
-            "normal": np.array(
-                [np.array(h.n) if v else np.zeros(3) for h, v in zip(hits, valid, strict=True)]
-            ),
-        }
-    ray = mi.Ray3f(mi.Point3f(start), mi.Vector3f(towards))
-    hit = scene.mi_scene.ray_intersect(ray, mi.RayFlags.Minimal, coherent=False)
-    valid = hit.is_valid()
-    distance = dr.select(valid, hit.t, 0)
-    shape = dr.select(valid, scene.shape_ids(hit.shape, valid), 0)
-    normal = dr.select(valid, hit.n, 0)
-    dr.eval(distance, shape, normal)
-    return {"distance": np.array(distance), "shape_id": np.array(shape), "normal": np.array(normal).T}
