@@ -15,6 +15,9 @@ from gibench.errors import GibenchError
 
 Image = NDArray[np.float32]
 
+KEY = 0.18
+"""Where the geometric mean of the input is put before the network sees it."""
+
 
 class DenoiserError(GibenchError):
     """The denoiser is not there, or refused its input."""
@@ -25,6 +28,12 @@ def denoiser_version() -> str | None:
     with contextlib.suppress(importlib.metadata.PackageNotFoundError):
         return importlib.metadata.version("mitsuba-oidn")
     return None
+
+
+def input_scale(radiance: Image) -> float:
+    """Exposure that puts the geometric mean of the lit values of (H, W, 3) radiance at KEY; needs one above 0."""
+    lit = radiance[radiance > 0].astype(np.float64)
+    return float(KEY / np.exp(np.log(lit).mean()))
 
 
 def denoise(radiance: Image, *, albedo: Image | None = None, normal: Image | None = None) -> Image:
@@ -47,5 +56,7 @@ def denoise(radiance: Image, *, albedo: Image | None = None, normal: Image | Non
         albedo=None if albedo is None else np.ascontiguousarray(albedo, dtype=np.float32),
         normal=None if normal is None else np.ascontiguousarray(normal, dtype=np.float32),
         hdr=True,
+        # OIDN's own choice of exposure depends on the number of threads in its last bits, and so would every pixel.
+        input_scale=input_scale(radiance),
     )
     return np.maximum(np.asarray(result, dtype=np.float32), 0.0)

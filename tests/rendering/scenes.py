@@ -122,6 +122,8 @@ def render_path(mi_scene: Any, camera: PinholeCamera, side: int, spp: int, seed:
     """Mitsuba's own `path` through a box filter, (side, side, 3); max_depth counts scattering events."""
     import mitsuba as mi
 
+    from gibench.rendering.integrator import RR_DEPTH
+
     sensor = mi.load_dict(
         {
             "type": "perspective",
@@ -140,5 +142,6 @@ def render_path(mi_scene: Any, camera: PinholeCamera, side: int, spp: int, seed:
             "sampler": {"type": "independent"},
         }
     )
-    integrator = mi.load_dict({"type": "path", "max_depth": max_depth + 1})
+    # The same Russian roulette, so that the two also compare by time.
+    integrator = mi.load_dict({"type": "path", "max_depth": max_depth + 1, "rr_depth": RR_DEPTH})
     return np.array(mi.render(mi_scene, sensor=sensor, integrator=integrator, spp=spp, seed=seed))

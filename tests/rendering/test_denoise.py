@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
+import pytest
 
 from gibench.rendering import denoise
+from gibench.rendering.backend import is_scalar, limit_threads
 from gibench.rendering.channels import PARTS
 from gibench.rendering.render import render_frame
 from gibench.rendering.scene import load_dict
@@ -34,6 +38,23 @@ def test_a_black_part_stays_exactly_black():
     assert not denoise.denoise(black).any()
 
 
-def test_denoising_is_reproducible():
-    image = np.random.default_rng(0).exponential(size=(40, 56, 3)).astype(np.float32)
-    np.testing.assert_array_equal(denoise.denoise(image), denoise.denoise(image.copy()))
+@pytest.mark.parametrize("spread", [0.5, 3.0])
+def test_denoising_does_not_depend_on_the_number_of_threads(spread):
+    if is_scalar():
+        pytest.skip("Dr.Jit has no threads to limit")
+    image = np.random.default_rng(0).lognormal(sigma=spread, size=(96, 128, 3)).astype(np.float32)
+    results = []
+    for threads in (1, 2, 3):
+        limit_threads(threads)
+        results.append(denoise.denoise(image))
+    limit_threads(os.cpu_count() or 1)
+    for result in results[1:]:
+        np.testing.assert_array_equal(results[0], result)
+
+
+@pytest.mark.parametrize("level", [1e-8, 1.0, 1e6])
+def test_denoising_is_blind_to_the_unit_of_radiance(level):
+    image = np.random.default_rng(1).exponential(size=(48, 64, 3)).astype(np.float32)
+    np.testing.assert_allclose(
+        denoise.denoise(image * np.float32(level)) / level, denoise.denoise(image), rtol=1e-3
+    )
