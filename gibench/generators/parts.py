@@ -173,7 +173,8 @@ class Room:
     """A furnished, lit room with its cameras; see `rooms.sample_room`.
 
     kind: "living", "bedroom", "dining-kitchen", "office" or "bathroom". parameters: the shell's and whatever
-    else reproduces it. rejections: reason → count, for tries of the room and of its views.
+    else reproduces it. openings: (N, 3, 3) windows, each as corner and two edges whose cross product points inside,
+    metres. rejections: reason → count, for tries of the room and of its views.
     """
 
     seed: int
@@ -185,4 +186,5 @@ class Room:
     environment: Environment
     materials: Mapping[str, Material]
     cameras: tuple[Camera, ...]
+    openings: FloatArray = field(default_factory=lambda: np.zeros((0, 3, 3)))
     rejections: Mapping[str, int] = field(default_factory=dict)

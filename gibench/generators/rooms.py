@@ -26,7 +26,8 @@ from gibench.generators.shell_sampling import sample_shell
 from gibench.generators.visibility import RayCaster, Surface
 
 KINDS = tuple(FURNISH)
-LANES = ("kind", "shell", "layout", "materials", "lights", "cameras", "environment")
+# A lane is known by its place here: new ones go to the end, or every room of every seed changes.
+LANES = ("kind", "shell", "layout", "materials", "lights", "cameras", "environment", "path")
 TRIES = 12  # of one room before it is given up
 LEAST_FREE = 0.8  # floor that cameras may stand on, m²
 LEAST_THINGS = 14  # pieces of furniture, lamps and small things included
@@ -58,14 +59,16 @@ def sample_room(
     kinds: Sequence[str] = KINDS,
     views: int = 4,
     path: str | None = None,
+    path_views: int = 0,
     environment: Environment | str | None = None,
     **fixed: Any,
 ) -> Room:
     """Draw room number `index` of the run `seed`; it depends on these two and on the options alone.
 
     kind: of the room; drawn from `kinds` if None. views: number of cameras. path: None for stills, or "walk",
-    "orbit" or "eight" for one path of that many frames. environment: what lies outside: "none", "sunsky", the path
-    of an HDR panorama, or an Environment; drawn if None.
+    "orbit" or "eight" for one path of that many frames. path_views: cameras on the path in a room that has stills
+    too: above 0 the `views` are stills, as without a path, and these come after them. environment: what lies
+    outside: "none", "sunsky", the path of an HDR panorama, or an Environment; drawn if None.
     fixed: arguments of `build_shell` that are not drawn, such as width=4.0.
 
     A try that fails is counted in `Room.rejections` by its reason and drawn again. Raises RejectedRoom when all
@@ -76,12 +79,16 @@ def sample_room(
             raise UnknownKind(f"there is no room kind {name!r}; choose from {', '.join(KINDS)}")
     if path is not None and path not in PATHS:
         raise UnknownKind(f"there is no camera path {path!r}; choose from {', '.join(PATHS)}")
+    if path_views and path is None:
+        raise UnknownKind(f"{path_views} cameras on no path: choose path from {', '.join(PATHS)}")
     rejections: Counter[str] = Counter()
     if kind is None:
         kind = kinds[int(_lane(seed, index, "kind", 0).integers(len(kinds)))]
     for attempt in range(TRIES):
         try:
-            room = _try_room(seed, index, attempt, kind, views, path, environment, fixed, rejections)
+            room = _try_room(
+                seed, index, attempt, kind, views, path, path_views, environment, fixed, rejections
+            )
         except RejectedRoom as refusal:
             rejections[refusal.reason] += 1
         except NoView as refusal:
@@ -111,6 +118,7 @@ def _try_room(
     kind: str,
     views: int,
     path: str | None,
+    path_views: int,
     environment: Environment | str | None,
     fixed: Mapping[str, Any],
     rejections: Counter[str],
@@ -133,10 +141,13 @@ def _try_room(
     objects = _objects(plan, palette)
 
     stage = Stage(free, shell.height, _middles(plan), _caster(plan), len(shell.pieces))
-    if path is None:
+    if path is None or path_views:
         cameras, refused = sample_stills(lane("cameras"), stage, views)
     else:
         cameras, refused = sample_path(lane("cameras"), stage, path, views)
+    if path is not None and path_views:
+        walked, refused_too = sample_path(lane("path"), stage, path, path_views)
+        cameras, refused = cameras + walked, refused + refused_too
     rejections.update({f"view: {reason}": count for reason, count in refused.items()})
 
     lights = tuple(
@@ -167,6 +178,7 @@ def _try_room(
         environment,
         materials,
         cameras,
+        shell.window_rectangles,
         dict(rejections),
     )
 

@@ -21,6 +21,7 @@ from gibench.generators.materials import bsdf_xml, tile_size
 from gibench.generators.outside import GROUND, ground_element
 from gibench.generators.panorama import write_panorama
 from gibench.generators.parts import Camera, Light, Mesh, Room, Texture
+from gibench.rendering.scene import OPENINGS
 
 PANORAMA = "textures/environment.hdr"  # what lies outside the windows
 
@@ -35,7 +36,7 @@ def write_room(
 ) -> None:
     """Write a room into a folder, which is made if it does not exist.
 
-    scene.xml, meshes/*.ply, textures/*.png, room.glb and room.json. Equal rooms give equal files.
+    scene.xml, meshes/*.ply, textures/*.png, openings.json, room.glb and room.json. Equal rooms give equal files.
     max_depth (Mitsuba's: 1 shows lamps alone, 2 direct light), resolution (width, height) and spp are those of
     the integrator, films and samplers in scene.xml.
     """
@@ -55,6 +56,7 @@ def write_room(
     indent(scene, "  ")
     ElementTree(scene).write(folder / "scene.xml", encoding="utf-8", xml_declaration=True)
     write_glb(room, folder)
+    (folder / OPENINGS).write_text(json.dumps(room.openings.tolist()) + "\n", encoding="utf-8")
     text = json.dumps(describe(room), indent=1, allow_nan=False)
     (folder / "room.json").write_text(text + "\n", encoding="utf-8")
 

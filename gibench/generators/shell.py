@@ -98,6 +98,21 @@ class Shell:
         return tuple(o for o in self.openings if o.kind == "window")
 
     @property
+    def window_rectangles(self) -> FloatArray:
+        """(N, 3, 3) corner and two edges of each window on its wall's outer face, with the room in front."""
+        rectangles = []
+        for window in self.windows:
+            wall = self.walls[window.wall]
+            x, y = wall.point(window.s0, -wall.thickness)
+            along = (window.s1 - window.s0) * wall.along
+            up = [0.0, 0.0, window.z1 - window.z0]
+            edges = ([*along, 0.0], up)
+            if np.cross(*edges) @ [*wall.inward, 0.0] < 0:
+                edges = edges[::-1]
+            rectangles.append([[x, y, window.z0], *edges])
+        return np.array(rectangles, dtype=np.float64).reshape(-1, 3, 3)
+
+    @property
     def skirting_depth(self) -> float:
         """How far the skirting stands out from the wall, metres."""
         return float(self.parameters["skirting"][1])

@@ -113,11 +113,28 @@ class _Block:
     max_depth: int
     guides: bool
 
+    @property
+    def groups(self) -> int:
+        """Groups of samples in each pixel."""
+        return self.samples // 4**self.levels
 
-def _launch(
-    scene: Scene, generator: RayGenerator, block: _Block
-) -> tuple[dict[str, NDArray[np.float32]], NDArray[np.float32], int]:
-    """Means over the samples of each pixel; the groups' shares of that of color; how many paths were invalid."""
+
+@dataclass(frozen=True)
+class _Launched:
+    """Over the samples of each pixel of a block.
+
+    parts: name → (pixels, 3), means. mean, squares: (pixels, 3) float64, mean of the group means of color and the sum
+    of their squared deviations from it. invalid: paths that came back with NaN or infinity and count as 0.
+    """
+
+    parts: dict[str, NDArray[np.float32]]
+    mean: NDArray[np.float64]
+    squares: NDArray[np.float64]
+    invalid: int
+
+
+def _launch(scene: Scene, generator: RayGenerator, block: _Block) -> _Launched:
+    """Traces a block as one kernel."""
     import drjit as dr
     import mitsuba as mi
 
@@ -137,6 +154,7 @@ def _launch(
         generator.rays(corner + sampler.next_2d()),
         max_depth=block.max_depth,
         guides=block.guides,
+        portals=scene.portals,
     )
 
     parts = {name: getattr(path, name) for name in PARTS}
@@ -152,23 +170,31 @@ def _launch(
     # One kernel for all of it. A reduction of what is not evaluated yet would trace the paths once more.
     dr.eval(parts, invalid)
 
-    color = sum(parts[name] for name in PARTS)
     sums = {name: [dr.block_sum(c, block.samples) for c in value] for name, value in parts.items()}
-    groups = [dr.block_sum(c, 4**block.levels) for c in color]
+    means, squares = [], []
+    for component in sum(parts[name] for name in PARTS):
+        group = dr.block_sum(component, 4**block.levels) * block.groups
+        mean = dr.block_sum(group / block.groups, block.groups)
+        # As multiples of the mean, which are at most the number of groups: squares of huge radiance overflow.
+        multiple = dr.select(group > 0, group / dr.repeat(mean, block.groups), 0)
+        means.append(mean)
+        squares.append(dr.block_sum(dr.square(multiple - 1), block.groups))
     count = dr.sum(invalid)
-    dr.eval(sums, groups, count)
-    return (
-        {name: np.stack([np.array(c) for c in value], axis=-1) for name, value in sums.items()},
-        np.stack([np.array(c) for c in groups], axis=-1).reshape(
-            block.pixels, block.samples // 4**block.levels, 3
-        ),
+    dr.eval(sums, means, squares, count)
+
+    def stacked(components: list[Any]) -> NDArray[np.float32]:
+        return np.stack([np.array(c) for c in components], axis=-1)
+
+    values = stacked(means).astype(np.float64)
+    return _Launched(
+        {name: stacked(value) for name, value in sums.items()},
+        values,
+        stacked(squares).astype(np.float64) * np.square(values),
         int(count[0]),
     )
 
 
-def _launch_scalar(
-    scene: Scene, generator: RayGenerator, block: _Block
-) -> tuple[dict[str, NDArray[np.float32]], NDArray[np.float32], int]:
+def _launch_scalar(scene: Scene, generator: RayGenerator, block: _Block) -> _Launched:
     """The same one path at a time, for machines on which Dr.Jit compiles nothing."""
     import mitsuba as mi
 
@@ -189,8 +215,11 @@ def _launch_scalar(
     values[:, ~finite] = 0
     values /= block.samples
     color = values[: len(PARTS)].sum(axis=0)
-    groups = color.reshape(block.pixels, block.samples // 4**block.levels, 4**block.levels, 3).sum(axis=2)
-    return dict(zip(names, values.sum(axis=2), strict=True)), groups, int((~finite).sum())
+    groups = color.reshape(block.pixels, block.groups, 4**block.levels, 3).sum(axis=2, dtype=np.float64)
+    groups *= block.groups
+    mean = groups.mean(axis=1)
+    squares = np.square(groups - mean[:, None]).sum(axis=1, dtype=np.float64)
+    return _Launched(dict(zip(names, values.sum(axis=2), strict=True)), mean, squares, int((~finite).sum()))
 
 
 def _add(
@@ -218,19 +247,16 @@ def _add(
         )
         start = time.perf_counter()
         block = _Block(resolution[0], first, count, samples, estimate.levels, number, max_depth, guides)
-        launched, groups, invalid = launch(scene, generator, block)
+        launched = launch(scene, generator, block)
         estimate.seconds += time.perf_counter() - start
-        estimate.invalid += invalid
-        for name, value in launched.items():
-            estimate.sums.setdefault(name, np.zeros((estimate.pixels, 3)))[where] += (
-                value.astype(np.float64) * samples
-            )
+        estimate.invalid += launched.invalid
+        for name, value in launched.parts.items():
+            sums = estimate.sums.setdefault(name, np.zeros((estimate.pixels, 3)))
+            sums[where] += value.astype(np.float64) * samples
 
         # Chan, Golub and LeVeque 1979: pairwise update of mean and squared deviations.
-        means = groups.astype(np.float64) * added
-        mean = means.mean(axis=1)
-        shift = mean - estimate.mean[where]
-        estimate.squares[where] += np.square(means - mean[:, None]).sum(axis=1)
+        shift = launched.mean - estimate.mean[where]
+        estimate.squares[where] += launched.squares
         estimate.squares[where] += np.square(shift) * (estimate.groups * added / total)
         estimate.mean[where] += shift * (added / total)
     estimate.groups = total

@@ -89,16 +89,59 @@ def _emission(scene, si, active):
     return mi.Spectrum(0) if emitter is None else emitter.eval(si, active)
 
 
-def _emission_weight(scene, si, reference, pdf, delta, active):
+def _emission_weight(scene, portals, si, reference, pdf, delta, active):
     """Weight of emission met by sampling the BSDF, against sampling the light from `reference`."""
-    if si.emitter(scene) is None:
+    emitter = si.emitter(scene)
+    if emitter is None:
         return mi.Float(0)
     towards = mi.DirectionSample3f(scene, si, reference)
-    return _mis_weight(pdf, scene.pdf_emitter_direction(reference, towards, active & (delta ^ True)))
+    active = active & (delta ^ True)
+    light_pdf = scene.pdf_emitter_direction(reference, towards, active)
+    if portals is not None:
+        by_portal = dr.select(emitter == portals.environment, portals.density(reference.p, towards.d), 0)
+        light_pdf = dr.lerp(light_pdf, by_portal, portals.share)
+    return _mis_weight(pdf, light_pdf)
+
+
+def _sample_light(scene, portals, si, u, active):
+    """Samples a direction to a light that si sees.
+
+    Returns the direction, its density per steradian (0 where there is no light), whether nothing but this could have
+    found it, and radiance over density.
+    """
+    if portals is None:
+        sample, light = scene.sample_emitter_direction(si, u, True, active)
+        return sample.d, sample.pdf, sample.delta, light
+    share = portals.share
+    entering = active & (u.x < share)
+    u = mi.Point2f(dr.select(entering, u.x / share, (u.x - share) / (1 - share)), u.y)
+    sample, light = scene.sample_emitter_direction(si, u, False, active & (entering ^ True))
+    through = portals.sample(si.p, u)
+    entering &= dr.any(through != 0)
+    radiance = light * sample.pdf
+    direction = dr.select(entering, through, sample.d)
+    ray = si.spawn_ray_to(sample.p)
+    ray = dr.select(entering, si.spawn_ray(direction), ray)
+
+    # One density for both ways to the environment.
+    outside = dr.zeros(mi.DirectionSample3f)
+    outside.d = direction
+    outside.emitter = portals.environment
+    pdf = dr.select(entering, scene.pdf_emitter_direction(si, outside, entering), sample.pdf)
+    sky = dr.zeros(mi.SurfaceInteraction3f)
+    sky.wi = -direction
+    radiance = dr.select(entering, portals.environment.eval(sky, entering), radiance)
+    to_environment = entering | (sample.emitter == portals.environment)
+    by_portal = dr.select(to_environment, portals.density(si.p, direction), 0)
+    delta = sample.delta & (entering ^ True)
+    mixed = dr.lerp(pdf, by_portal, share)
+    chosen = active & (mixed > 0) & (entering | (sample.pdf > 0))
+    chosen &= scene.ray_test(ray, chosen) ^ True
+    return direction, dr.select(chosen, mixed, 0), delta, dr.select(chosen, radiance * _inverse(mixed), 0)
 
 
 @dr.syntax
-def _indirect(scene, sampler, ray, reference, pdf, delta, weight, eta, active, max_depth):
+def _indirect(scene, portals, sampler, ray, reference, pdf, delta, weight, eta, active, max_depth):
     """Follows a path from its first bounce on.
 
     reference: the first hit (mi.Interaction3f); pdf, delta: of the direction taken there; weight: throughput of the
@@ -118,7 +161,7 @@ def _indirect(scene, sampler, ray, reference, pdf, delta, weight, eta, active, m
         si = scene.ray_intersect(ray, mi.RayFlags.All, False, active)
 
         # Emission at this vertex, weighted against the light sampling of the vertex before it.
-        share = _emission_weight(scene, si, reference, pdf, delta, active)
+        share = _emission_weight(scene, portals, si, reference, pdf, delta, active)
         seen = throughput * _emission(scene, si, active) * share
         direct += dr.select(depth == 1, seen, 0)
         later += dr.select(depth == 1, 0, seen)
@@ -128,14 +171,14 @@ def _indirect(scene, sampler, ray, reference, pdf, delta, weight, eta, active, m
 
         # Light sampling.
         lit = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-        sample, light = scene.sample_emitter_direction(si, sampler.next_2d(), True, lit)
-        lit &= sample.pdf != 0
-        to_light = si.to_local(sample.d)
+        direction, light_pdf, only_so, light = _sample_light(scene, portals, si, sampler.next_2d(), lit)
+        lit &= light_pdf != 0
+        to_light = si.to_local(direction)
         value, value_pdf, bounce, bounce_weight = bsdf.eval_pdf_sample(
             context, si, to_light, sampler.next_1d(), sampler.next_2d(), active
         )
         value = si.to_world_mueller(value, -to_light, si.wi)
-        share = dr.select(sample.delta, 1, _mis_weight(sample.pdf, value_pdf))
+        share = dr.select(only_so, 1, _mis_weight(light_pdf, value_pdf))
         later += dr.select(lit, throughput * value * light * share, 0)
 
         # The next direction.
@@ -156,40 +199,50 @@ def _indirect(scene, sampler, ray, reference, pdf, delta, weight, eta, active, m
     return direct, later
 
 
-def trace_paths(scene, sampler, ray, *, max_depth: int, guides: bool = False) -> PathSample:
-    """Traces one path a lane and sorts its radiance.
+def scatter_paths(
+    scene, sampler, si, bsdf, active, *, max_depth: int, lobes: str = "all", portals: Any = None
+) -> PathSample:
+    """Traces one path a lane from points that light is reflected at, and sorts what they send along si.wi.
 
-    scene: mitsuba.Scene. sampler: from `sampling`. ray: mi.Ray3f. max_depth: largest number of scattering events, ≥ 0
-    (Mitsuba's `path` counts segments: its max_depth is one more). guides: whether first-hit albedo and normal are
-    returned too.
+    scene: mitsuba.Scene. sampler: from `sampling`. si: mi.SurfaceInteraction3f, bsdf: its material. max_depth: largest
+    number of scattering events, that at si included. lobes: "all"; "diffuse" or "specular" reflect by that lobe
+    alone, with all samples, and leave the other at 0. portals: `Scene.portals`, for less noise by daylight. emission
+    of the result is 0.
     """
-    everything = mi.BSDFContext()
+    mask = {"all": int(mi.BSDFFlags.All), "diffuse": int(_DIFFUSE), "specular": _OTHER}[lobes]
+    asked = mi.BSDFContext(mi.TransportMode.Radiance, mask)
     diffuse = mi.BSDFContext(mi.TransportMode.Radiance, int(_DIFFUSE))
-    si = scene.ray_intersect(ray, mi.RayFlags.All, True)
-    emission = _emission(scene, si, True)
-    active = si.is_valid() & (max_depth >= 1)
-    bsdf = bsdf_at(si, ray)
+    active = active & si.is_valid() & ((bsdf.flags() & mask) != 0) & (max_depth >= 1)
 
     # The same calls as in the loop, and one more for the diffuse lobe alone: kernels stay small.
     lit = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-    sample, light = scene.sample_emitter_direction(si, sampler.next_2d(), True, lit)
-    lit &= sample.pdf != 0
-    to_light = si.to_local(sample.d)
+    direction, light_pdf, only_so, light = _sample_light(scene, portals, si, sampler.next_2d(), lit)
+    lit &= light_pdf != 0
+    to_light = si.to_local(direction)
     value, value_pdf, bounce, weight = bsdf.eval_pdf_sample(
-        everything, si, to_light, sampler.next_1d(), sampler.next_2d(), active
+        asked, si, to_light, sampler.next_1d(), sampler.next_2d(), active
     )
-    share = dr.select(sample.delta, 1, _mis_weight(sample.pdf, value_pdf))
+    share = dr.select(only_so, 1, _mis_weight(light_pdf, value_pdf))
     light = dr.select(lit, light * share, 0)
-    value_diffuse, value_other = _split(bsdf, value, bsdf.eval(diffuse, si, to_light, lit))
 
     delta = mi.has_flag(bounce.sampled_type, mi.BSDFFlags.Delta)
-    smooth = active & (delta ^ True) & (bounce.pdf > 0)
-    bounce_diffuse = bsdf.eval(diffuse, si, bounce.wo, smooth) * dr.select(smooth, _inverse(bounce.pdf), 0)
-    weight_diffuse, weight_other = _split(bsdf, weight, bounce_diffuse)
+    none = mi.Spectrum(0)
+    if lobes == "all":
+        value_diffuse, value_other = _split(bsdf, value, bsdf.eval(diffuse, si, to_light, lit))
+        smooth = active & (delta ^ True) & (bounce.pdf > 0)
+        bounce_diffuse = bsdf.eval(diffuse, si, bounce.wo, smooth) * dr.select(
+            smooth, _inverse(bounce.pdf), 0
+        )
+        weight_diffuse, weight_other = _split(bsdf, weight, bounce_diffuse)
+    elif lobes == "diffuse":
+        value_diffuse, value_other, weight_diffuse, weight_other = value, none, weight, none
+    else:
+        value_diffuse, value_other, weight_diffuse, weight_other = none, value, none, weight
     active &= dr.max(weight) > 0
 
     seen, later = _indirect(
         scene,
+        portals,
         sampler.independent,
         si.spawn_ray(si.to_world(bounce.wo)),
         mi.Interaction3f(si),
@@ -200,14 +253,28 @@ def trace_paths(scene, sampler, ray, *, max_depth: int, guides: bool = False) ->
         active,
         max_depth,
     )
-
-    result = PathSample(
-        emission,
+    return PathSample(
+        mi.Spectrum(0),
         light * value_diffuse + weight_diffuse * seen,
         light * value_other + weight_other * seen,
         weight_diffuse * later,
         weight_other * later,
     )
+
+
+def trace_paths(
+    scene, sampler, ray, *, max_depth: int, guides: bool = False, portals: Any = None
+) -> PathSample:
+    """Traces one path a lane and sorts its radiance.
+
+    scene: mitsuba.Scene. sampler: from `sampling`. ray: mi.Ray3f. max_depth: largest number of scattering events, ≥ 0
+    (Mitsuba's `path` counts segments: its max_depth is one more). guides: whether first-hit albedo and normal are
+    returned too. portals: `Scene.portals`, for less noise by daylight.
+    """
+    si = scene.ray_intersect(ray, mi.RayFlags.All, True)
+    bsdf = bsdf_at(si, ray)
+    result = scatter_paths(scene, sampler, si, bsdf, mi.Bool(True), max_depth=max_depth, portals=portals)
+    result.emission = _emission(scene, si, True)
     if guides:
         # On a conductor this is a value of its lobe and may exceed 1; the denoiser wants [0, 1].
         result.albedo = dr.select(si.is_valid(), dr.clip(bsdf.eval_diffuse_reflectance(si), 0, 1), 0)

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gibench.errors import GibenchError
 from gibench.rendering.backend import is_scalar, select_variant
 from gibench.rendering.kernel_sharing import spare_plugins
+
+OPENINGS = "openings.json"
+"""Beside scene.xml: a list of rectangles, each as corner and two edges in metres, that daylight enters by."""
 
 
 class SceneError(GibenchError):
@@ -24,7 +29,8 @@ class Scene:
 
     mi_scene: the `mitsuba.Scene`. materials, shapes: names by id; id i is entry i − 1, since id 0 is a miss. The order
     is alphabetical by shape id (a material stands where its first shape does): Mitsuba loads in parallel and lists
-    shapes in an order of its own.
+    shapes in an order of its own. openings: (N, 3, 3), the rectangles that daylight enters by (corner and two edges
+    whose cross product points inside, metres), or None where nothing is known of them.
     """
 
     mi_scene: Any
@@ -32,6 +38,7 @@ class Scene:
     shapes: tuple[str, ...]
     _material_of: dict[int, int]
     _shape_of: dict[int, int]
+    openings: NDArray[np.float64] | None = None
     _beside: tuple[Any, ...] = ()  # what must live as long as the scene
 
     @cached_property
@@ -47,6 +54,15 @@ class Scene:
             return array
 
         return table(self._material_of), table(self._shape_of)
+
+    @cached_property
+    def portals(self) -> Any:
+        """`portals.Portals` of the openings; None where none are known, or under the scalar variant."""
+        if self.openings is None or is_scalar():
+            return None
+        from gibench.rendering.portals import Portals
+
+        return Portals(self.mi_scene, self.openings)
 
     def material_ids(self, bsdf: Any, active: Any) -> Any:
         """Ids (from 1) of an array of BSDF pointers; 0 where not `active`."""
@@ -109,7 +125,8 @@ def load_dict(description: dict[str, Any]) -> Scene:
 def load_scene(path: str | Path, *, share_kernels: bool = False) -> Scene:
     """A scene from a Mitsuba 3 XML file. Selects a variant where none is current.
 
-    share_kernels: for one of many rooms, so that the next need not be compiled again; see `kernel_sharing`.
+    share_kernels: for one of many rooms, so that the next need not be compiled again; see `kernel_sharing`. A file
+    OPENINGS beside it says where daylight enters; without it the same image takes more samples.
 
     Raises SceneError where the file is missing or Mitsuba refuses it, with its reason.
     """
@@ -124,4 +141,19 @@ def load_scene(path: str | Path, *, share_kernels: bool = False) -> Scene:
     except RuntimeError as error:
         reason = " ".join(str(error).split())
         raise SceneError(f"Mitsuba refuses {path}: {reason}") from error
-    return replace(scene, _beside=spare_plugins()) if share_kernels else scene
+    openings = _openings(Path(path).with_name(OPENINGS))
+    return replace(scene, openings=openings, _beside=spare_plugins() if share_kernels else ())
+
+
+def _openings(file: Path) -> NDArray[np.float64] | None:
+    if not file.is_file():
+        return None
+    try:
+        openings = np.array(json.loads(file.read_text(encoding="utf-8")), dtype=np.float64).reshape(-1, 3, 3)
+    except (ValueError, TypeError):
+        openings = np.full((1, 3, 3), np.nan)
+    if not np.isfinite(openings).all():
+        raise SceneError(
+            f"{file} is no list of rectangles (corner and two edges, metres): remove it or mend it"
+        )
+    return openings

@@ -57,6 +57,18 @@ def test_lanes_are_apart():
     assert len(walking.cameras) == 6
 
 
+def test_a_path_beside_stills_leaves_the_room_and_its_stills_as_they_were():
+    alone = sample_room(5, 3, kind="office", views=3)
+    both = sample_room(5, 3, kind="office", views=3, path="walk", path_views=5)
+    same_objects(alone, both)
+    assert alone.lights == both.lights
+    assert alone.environment == both.environment
+    assert both.cameras[:3] == alone.cameras
+    assert [(camera.path, camera.step) for camera in both.cameras[3:]] == [("walk", k) for k in range(5)]
+    with pytest.raises(UnknownKind, match="5 cameras on no path"):
+        sample_room(5, 3, path_views=5)
+
+
 def test_names_are_unique_and_materials_known():
     for index in INDICES:
         a_room = room(index)

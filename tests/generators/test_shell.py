@@ -113,6 +113,26 @@ def test_light_leaves_through_the_window_alone():
     assert (exits[:, 2] < WINDOW["z1"]).all()
 
 
+@pytest.mark.parametrize("notch", [None, (2, 1.2, 1.6)])
+def test_all_light_that_leaves_passes_through_the_window_rectangles(notch):
+    walls = range(4 if notch is None else 6)
+    windows = [WINDOW | {"wall": wall, "s0": 0.4, "s1": 0.9} for wall in walls]
+    shell = shell_with(DOOR | {"s0": 1.2, "s1": 2.0}, *windows, notch=notch)
+    origins, directions = random_rays(np.random.default_rng(7), shell, 60_000)
+    _, owner = caster(shell).cast(origins, directions)
+    origins, directions = origins[owner < 0], directions[owner < 0]
+    passed = np.zeros(len(origins), dtype=int)
+    for corner, u, v in shell.window_rectangles:
+        normal = np.cross(u, v)
+        distance = ((corner - origins) @ normal) / (directions @ normal)
+        at = origins + distance[:, None] * directions - corner
+        a, b = at @ u / (u @ u), at @ v / (v @ v)
+        passed += (distance > 0) & (directions @ normal < 0) & (abs(a - 0.5) <= 0.5) & (abs(b - 0.5) <= 0.5)
+    assert len(origins) > 300
+    assert (passed >= 1).all()
+    assert len(shell.window_rectangles) == len(windows)
+
+
 def test_inner_size_is_the_sampled_one():
     shell = shell_with(DOOR, width=4.4, depth=5.2, height=2.7)
     directions = np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]])

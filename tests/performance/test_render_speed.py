@@ -74,3 +74,41 @@ def test_stratified_against_independent_samples():
     plain = variance(0)
     for levels in (1, 2, 3):
         print(f"\nvariance with groups of {4**levels}: {variance(levels) / plain:.2f} of independent samples")
+
+
+@pytest.mark.parametrize("index", [5, 7, 10])
+def test_portals_against_none(tmp_path, index):
+    """Squared median error times time in a room by daylight, with windows as portals and without."""
+    from dataclasses import replace
+
+    from gibench.generators.rooms import sample_room
+    from gibench.generators.scene_files import write_room
+    from gibench.rendering.camera import PinholeCamera
+    from gibench.rendering.scene import load_scene
+
+    room = sample_room(0, index, views=1, environment="sunsky")
+    write_room(room, tmp_path)
+    scene = load_scene(tmp_path / "scene.xml")
+    camera = PinholeCamera(room.cameras[0].position, room.cameras[0].target, room.cameras[0].fov)
+    errors = {True: [], False: []}
+
+    def render(portals):
+        def run(seed):
+            frame = render_frame(
+                scene if portals else replace(scene, openings=None),
+                camera,
+                resolution=(160, 120),
+                spp=64,
+                seed=seed,
+                channels=["color", "color_se"],
+            )
+            errors[portals].append(frame.median_error)
+
+        return run
+
+    _, _, time_ratio = _median_ratio(render(True), render(False))
+    variance = (np.mean(errors[True]) / np.mean(errors[False])) ** 2
+    print(
+        f"\nroom {index} ({room.kind}, {len(room.openings)} windows): variance {variance:.2f}, time {time_ratio:.2f}, "
+        f"variance x time {variance * time_ratio:.2f} of the same without portals"
+    )

@@ -1,0 +1,1 @@
+"""Every method that is scored: those of the papers and the classical ones, a folder a family."""

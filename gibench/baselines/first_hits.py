@@ -1,0 +1,65 @@
+"""What a frame's camera rays hit, as Dr.Jit arrays that stay on the device: where every deferred method begins."""
+
+# mypy: disable-error-code="no-untyped-def, misc"
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from gibench.rendering.camera import PinholeCamera, RayGenerator
+from gibench.rendering.scene import Scene
+
+
+@dataclass
+class FirstHits:
+    """Camera rays through a regular grid and what they hit; every array has a lane a grid point, in row order.
+
+    resolution: (width, height) of the grid. ray: mi.Ray3f. preliminary: mi.PreliminaryIntersection3f, whose
+    prim_index and prim_uv say where on which triangle. si: mi.SurfaceInteraction3f, its wi towards the viewer.
+    bsdf: mi.BSDFPtr. active: whether something was hit. emission: mi.Color3f, radiance seen straight, environment
+    included.
+    """
+
+    resolution: tuple[int, int]
+    ray: Any
+    preliminary: Any
+    si: Any
+    bsdf: Any
+    active: Any
+    emission: Any
+
+
+def first_hits(
+    scene: Scene, camera: PinholeCamera, resolution: tuple[int, int], *, grid: int = 1
+) -> FirstHits:
+    """Trace a grid of camera rays.
+
+    grid: rays along each side of a pixel, at the centres of its cells; the reference averages over the pixel, so
+    one ray at its centre costs edges dearly. Average with `pixels`. Needs a vectorised variant.
+    """
+    width, height = resolution[0] * grid, resolution[1] * grid
+    generator = RayGenerator(camera, (width, height))
+    lane = dr.arange(mi.UInt32, width * height)
+    columns = dr.opaque(mi.UInt32, width)
+    row = lane // columns
+    centre = mi.Point2f(mi.Float(lane - row * columns) + 0.5, mi.Float(row) + 0.5)
+    ray = generator.rays(centre)
+    preliminary = scene.mi_scene.ray_intersect_preliminary(ray, coherent=True)
+    si = preliminary.compute_surface_interaction(ray, mi.RayFlags.All)
+    emission = si.emitter(scene.mi_scene).eval(si)
+    active = si.is_valid()
+    return FirstHits((width, height), ray, preliminary, si, si.bsdf(ray), active, emission)
+
+
+def pixels(values: Any, hits: FirstHits, grid: int = 1) -> NDArray[np.float32]:
+    """A mi.Color3f of the grid as an image (height, width, 3) float32, each pixel the mean of its grid × grid rays."""
+    width, height = hits.resolution
+    image = np.array(mi.Color3f(values), dtype=np.float32).T.reshape(height, width, 3)
+    if grid == 1:
+        return image
+    return image.reshape(height // grid, grid, width // grid, grid, 3).mean(axis=(1, 3))

@@ -1,0 +1,177 @@
+"""What a method is to the benchmark: a card that says what it needs, and two stages that do the work.
+
+The card is light: listing methods imports neither torch nor Mitsuba, which come with the implementation. A package
+offers its cards through the entry-point group `gibench.methods`; `docs/adding-a-method.md` walks through one.
+"""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+from numpy.typing import NDArray
+
+from gibench.errors import GibenchError
+
+if TYPE_CHECKING:
+    from gibench.baselines.bakes import BakeCache
+    from gibench.baselines.stages import Stages
+    from gibench.datasets.loading import Frame
+    from gibench.rendering.camera import PinholeCamera
+    from gibench.rendering.scene import Scene
+
+Setting = int | float | str | bool
+
+
+class MethodError(GibenchError):
+    """A method that is asked for what it does not have, or that cannot do what it promises."""
+
+
+@dataclass(frozen=True)
+class Knob:
+    """One setting of a method, and what it may be.
+
+    values: allowed settings, cheapest first. bakes: a change needs another preparation; otherwise one preparation
+    serves all settings.
+    """
+
+    name: str
+    default: Setting
+    values: tuple[Setting, ...]
+    meaning: str
+    bakes: bool = False
+
+    def __post_init__(self) -> None:
+        """Raises MethodError for a default that is not allowed."""
+        if self.default not in self.values:
+            raise MethodError(f"knob {self.name}: the default {self.default!r} is not among {self.values}")
+
+
+@dataclass(frozen=True)
+class Method:
+    """The card of a method.
+
+    id: the column `method` of every table. tracks: ids of the tracks it can run on. family: what kind of method it
+    is ("probes", "ray tracing" …). paper: where it is from. implementation: "package.module:Class", an
+    `Implementation`, imported only to run it. channels: of the training views that it reads. knobs: its settings.
+    budget: the knob that equal-time comparisons turn. trained: draws random numbers while it is prepared, so that
+    several seeds say more than one.
+    """
+
+    id: str
+    title: str
+    family: str
+    tracks: tuple[str, ...]
+    paper: str
+    implementation: str
+    channels: tuple[str, ...] = ()
+    knobs: tuple[Knob, ...] = ()
+    budget: str | None = None
+    trained: bool = False
+
+    def settings(self, given: Mapping[str, Setting] | None = None) -> dict[str, Setting]:
+        """All knobs, those that are not given at their defaults.
+
+        Raises MethodError for a knob that does not exist (with the nearest names) or a value that is not allowed.
+        """
+        known = {knob.name: knob for knob in self.knobs}
+        for name, value in (given or {}).items():
+            if name not in known:
+                near = difflib.get_close_matches(name, known, n=3, cutoff=0.5) or sorted(known)
+                raise MethodError(f"{self.id} has no knob '{name}'; known: {', '.join(near) or 'none'}")
+            if value not in known[name].values or isinstance(value, bool) != isinstance(
+                known[name].default, bool
+            ):
+                allowed = ", ".join(map(str, known[name].values))
+                raise MethodError(f"{self.id}: {name} = {value!r} is not allowed; allowed are {allowed}")
+        return {knob.name: (given or {}).get(knob.name, knob.default) for knob in self.knobs}
+
+    def baked_settings(self, settings: Mapping[str, Setting]) -> dict[str, Setting]:
+        """Those of the settings that decide what is prepared."""
+        return {knob.name: settings[knob.name] for knob in self.knobs if knob.bakes}
+
+    def load(self) -> type[Implementation]:
+        """Import the implementation. Raises MethodError where it is not there."""
+        module, _, name = self.implementation.partition(":")
+        try:
+            return getattr(importlib.import_module(module), name)
+        except (ImportError, AttributeError) as problem:
+            raise MethodError(
+                f"{self.id}: {self.implementation} cannot be imported ({problem}); "
+                "pip install 'gibench[bench]' brings what our own methods need"
+            ) from problem
+
+
+@dataclass(frozen=True)
+class Site:
+    """What a method may prepare from.
+
+    scene: loaded under the run's variant. folder: that of the room, with scene.xml and room.json. resolution: (width,
+    height) of the frames to come. training: views of the room that are not scored, which load what they are asked for.
+    seed: all that the method may draw random numbers from. bakes: files that are shared with other methods.
+    stages: where preparation is timed.
+    """
+
+    scene: Scene
+    folder: Path
+    resolution: tuple[int, int]
+    training: Sequence[Frame]
+    seed: int
+    bakes: BakeCache
+    stages: Stages
+
+
+@dataclass(frozen=True)
+class View:
+    """A frame to be rendered: a camera of a path.
+
+    previous: the camera of the frame before it; None at the start of the path, when a method must forget what it
+    kept. seed: for what is drawn at random in this frame.
+    """
+
+    camera: PinholeCamera
+    previous: PinholeCamera | None
+    resolution: tuple[int, int]
+    index: int
+    seed: int
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """What a method says a frame looks like: (H, W, 3) float32, finite, ≥ 0, in the units of the channels.
+
+    color: all of the light. specular: what the first hit reflects by its specular lobe, direct and indirect; None
+    where the method cannot tell it apart.
+    """
+
+    color: NDArray[Any]
+    specular: NDArray[Any] | None = None
+    extra: Mapping[str, float] = field(default_factory=dict)
+    """Numbers worth a column, such as the samples that were spent."""
+
+
+class Implementation(Protocol):
+    """The two stages. One object serves one scene, one preparation and one seed.
+
+    A constructor takes the settings (`Method.settings`).
+    """
+
+    def __init__(self, settings: Mapping[str, Setting]) -> None:
+        """settings: every knob of the method."""
+
+    def prepare(self, site: Site) -> None:
+        """Bake and train for a scene. Called once."""
+
+    def render(self, view: View, stages: Stages) -> Prediction:
+        """Render one frame. The harness reads the clock around it; stages tells its parts apart."""
+
+
+class Adjustable(Protocol):
+    """An implementation whose knobs that do not bake may be turned after `prepare`."""
+
+    def adjust(self, settings: Mapping[str, Setting]) -> None:
+        """Take these settings from the next frame on; those that bake are as they were."""

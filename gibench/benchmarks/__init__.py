@@ -1,0 +1,1 @@
+"""Tracks, the harness that runs methods on them, results, statistics and reports."""
