@@ -16,8 +16,9 @@ from gibench.datasets.recipes import Recipe
 from gibench.datasets.room_making import Renderer, rendered_frame, sampled_room
 from gibench.generators.parts import Room
 
-#: The frame that is measured: at most this wide, and this many samples a pixel.
-MEASURED_WIDTH, MEASURED_SPP = 256, 16
+#: The frame that is measured: at most this wide, and at most this many samples a pixel, which are one pass of the
+#: renderer. Fewer would count what a pass costs at any size, such as tracing Python, as if each path cost it.
+MEASURED_WIDTH, MEASURED_SPP = 256, 64
 
 
 @dataclass
@@ -47,7 +48,7 @@ class Estimate:
     @property
     def frames(self) -> int:
         """Number of frames of the rooms that could be built."""
-        return self.rooms * self.recipe.views
+        return self.rooms * len(self.recipe.rendered_views())
 
     @property
     def bytes(self) -> float:
@@ -89,7 +90,7 @@ class RoomChecker:
         recipe = self.recipe
         width = min(recipe.resolution[0], MEASURED_WIDTH)
         height = max(1, round(recipe.resolution[1] * width / recipe.resolution[0]))
-        settings = {"resolution": (width, height), "spp": MEASURED_SPP, "error": None}
+        settings = {"resolution": (width, height), "spp": min(recipe.spp or MEASURED_SPP, MEASURED_SPP), "error": None}
         with tempfile.TemporaryDirectory(prefix="gibench-") as scratch:
             started = time.perf_counter()
             write_room(room, scratch)

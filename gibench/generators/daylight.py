@@ -237,4 +237,6 @@ def _read_exr(path: str) -> NDArray[np.float32]:
 
     with OpenEXR.File(path, separate_channels=True) as file:
         channels = file.channels()
-        return np.stack([channels[name].pixels for name in "RGB"], axis=-1).astype(np.float32)
+        # A panorama without colour has luminance alone.
+        names = "YYY" if "Y" in channels and "R" not in channels else "RGB"
+        return np.stack([channels[name].pixels for name in names], axis=-1).astype(np.float32)

@@ -247,3 +247,16 @@ def test_real_panoramas(mi):
         light = radiance(mi, emitter(mi, environment), directions)
         lux = 683 * 2 * np.pi * (light @ LUMINANCE * directions[:, 2]).mean()
         assert lux == pytest.approx(20e3, rel=0.1)  # a sun of one or two texels is coarse for any quadrature
+
+
+def test_a_panorama_without_colour_is_grey(tmp_path):
+    import OpenEXR
+
+    from gibench.generators.daylight import read_panorama
+
+    luminance = np.random.default_rng(0).random((8, 16), dtype=np.float32)
+    file = str(tmp_path / "grey.exr")
+    OpenEXR.File(
+        {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}, {"Y": luminance}
+    ).write(file)
+    np.testing.assert_array_equal(read_panorama(file), np.stack([luminance] * 3, axis=-1))
