@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from functools import lru_cache
 
 import numpy as np
@@ -41,7 +42,10 @@ def kelvin_to_rgb(kelvin: float) -> tuple[float, float, float]:
     """
     if not KELVIN_RANGE[0] <= kelvin <= KELVIN_RANGE[1]:
         raise BadLight(f"a light has a colour temperature of {kelvin} K; give one between 1000 and 25000 K")
-    import colour  # takes about a second, which only those who light a room should pay
+    with warnings.catch_warnings():
+        # It tells everybody without Matplotlib that it cannot draw plots, which nobody asked of it.
+        warnings.filterwarnings("ignore", message='"Matplotlib" related API')
+        import colour  # takes about a second, which only those who light a room should pay
 
     uv = colour.temperature.CCT_to_uv_Planck1900(kelvin)
     xyz = colour.xy_to_XYZ(colour.UCS_uv_to_xy(uv))
