@@ -111,12 +111,12 @@ def page(name: str) -> str:
 
 
 def python_blocks() -> list[tuple[str, str]]:
-    """Every block, apart from those that are files of the package, which begin with their path."""
+    """Every block, apart from those that are files of a package, which begin with their path."""
     return [
         (str(path.relative_to(ROOT)), block)
         for path in PAGES
         for block in blocks(str(path.relative_to(ROOT)), "python")
-        if not block.startswith("# gibench/")
+        if not re.match(r"# \S+\.py\n", block)
     ]
 
 

@@ -15,7 +15,11 @@ import typer
 from gibench.errors import GibenchError
 
 #: Exit code by the name of the error; every other `GibenchError` is a failure, 1.
-EXIT_CODES = {"RecipeError": 2, "FolderError": 2, "DatasetError": 2, "Interrupted": 130}
+EXIT_CODES = {
+    **dict.fromkeys(("RecipeError", "FolderError", "DatasetError"), 2),
+    **dict.fromkeys(("TrackError", "RegistryError", "ResultsError", "MethodError", "UnknownMetricError"), 2),
+    "Interrupted": 130,
+}
 
 
 def main() -> NoReturn:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from gibench.cli import dataset, doctor
+from gibench.cli import bench, dataset, doctor
 
 app = typer.Typer(
     name="gibench",
@@ -13,6 +13,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 app.add_typer(dataset.app, name="dataset")
+app.add_typer(bench.app, name="bench")
 app.command("doctor")(doctor.doctor)
 
 make_app = typer.Typer(name="make-dataset", add_completion=False, pretty_exceptions_enable=False)

@@ -60,11 +60,11 @@ def make(
         "resolution": None if resolution is None else _resolution(resolution),
         "spp": spp,
         "error": error,
-        "channels": None if channels is None else _names(channels, "--channels"),
-        "kinds": None if kind is None else _names(kind, "--kind"),
+        "channels": None if channels is None else names_in(channels, "--channels"),
+        "kinds": None if kind is None else names_in(kind, "--kind"),
     }
     chosen = _recipe(preset, recipe, {key: value for key, value in asked.items() if value is not None})
-    _check_variant(variant)
+    check_variant(variant)
     root = out or Path("data") / (recipe.stem if recipe is not None else preset or "small")
     if dry_run:
         from gibench.cli.making import dry_run as estimate_and_tell
@@ -155,7 +155,8 @@ def _recipe(preset: str | None, recipe: Path | None, overrides: dict[str, Any]) 
     return load_recipe(recipe, overrides) if recipe is not None else load_preset(preset or "small", overrides)
 
 
-def _check_variant(variant: str) -> None:
+def check_variant(variant: str) -> None:
+    """Raise a named error for a variant that does not exist."""
     from gibench.datasets.errors import nearest
     from gibench.rendering.backend import VARIANTS
 
@@ -170,7 +171,8 @@ def _resolution(text: str) -> tuple[int, int]:
     return int(match[1]), int(match[2])
 
 
-def _names(text: str, option: str) -> tuple[str, ...]:
+def names_in(text: str, option: str) -> tuple[str, ...]:
+    """Names with commas between them, as an option gives them."""
     names = tuple(name.strip() for name in text.split(",") if name.strip())
     if not names:
         raise _usage(f"{option}: '{text}' names nothing; write names with commas between them")

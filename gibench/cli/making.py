@@ -23,7 +23,7 @@ def make_and_tell(root: Path, recipe: Recipe, variant: str, workers: int, comman
         typer.echo(f"{root} is already complete")
     describe(root, summary.manifest)
     if summary.made:
-        frames = summary.made * recipe.views
+        frames = summary.made * len(recipe.rendered_views())
         typer.echo(_row("this run", f"{duration(summary.seconds)}, {summary.seconds / frames:.2f} s a frame"))
         typer.echo(_row("look at it", f"{root / 'preview.png'}"))
 

@@ -90,7 +90,11 @@ class RoomChecker:
         recipe = self.recipe
         width = min(recipe.resolution[0], MEASURED_WIDTH)
         height = max(1, round(recipe.resolution[1] * width / recipe.resolution[0]))
-        settings = {"resolution": (width, height), "spp": min(recipe.spp or MEASURED_SPP, MEASURED_SPP), "error": None}
+        settings = {
+            "resolution": (width, height),
+            "spp": min(recipe.spp or MEASURED_SPP, MEASURED_SPP),
+            "error": None,
+        }
         with tempfile.TemporaryDirectory(prefix="gibench-") as scratch:
             started = time.perf_counter()
             write_room(room, scratch)

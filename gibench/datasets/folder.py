@@ -64,7 +64,7 @@ def claimed(root: Path) -> Iterator[None]:
         root.mkdir(parents=True, exist_ok=True)
         if not (root / MANIFEST).exists():
             _refuse_foreign(root)
-        lock = _locked(root)
+        lock = lock_folder(root)
     except OSError as problem:
         _remove_empty(made)
         raise FolderError(_why_not(root, problem)) from None
@@ -73,8 +73,7 @@ def claimed(root: Path) -> Iterator[None]:
         yield
     finally:
         remove_partials(root)
-        (root / LOCK).unlink(missing_ok=True)
-        os.close(lock)
+        unlock_folder(root, lock)
         _remove_empty(made)
 
 
@@ -97,9 +96,17 @@ def _why_not(root: Path, problem: OSError) -> str:
     return f"{root} cannot be written ({problem.strerror}): choose another folder with --out"
 
 
-def _locked(root: Path) -> int:
-    """Descriptor of the lock file, held by this process until it ends, however it ends."""
-    import fcntl  # Unix; imported here so that reading datasets works everywhere
+def lock_folder(root: Path) -> int:
+    """Descriptor of the lock file, held by this process until it ends, however it ends.
+
+    Raises `FolderError` where another process holds it.
+    """
+    try:
+        import fcntl  # Unix; imported here so that reading datasets works everywhere
+    except ImportError:
+        raise FolderError(
+            f"{root} cannot be locked: this system has no file locks; make datasets under Linux, macOS or WSL"
+        ) from None
 
     while True:
         descriptor = os.open(root / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
@@ -117,6 +124,12 @@ def _locked(root: Path) -> int:
         except FileNotFoundError:
             pass
         os.close(descriptor)
+
+
+def unlock_folder(root: Path, lock: int) -> None:
+    """Give back what `lock_folder` took."""
+    (root / LOCK).unlink(missing_ok=True)
+    os.close(lock)
 
 
 def _remove_empty(folders: Iterable[Path]) -> None:

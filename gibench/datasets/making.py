@@ -134,15 +134,15 @@ class _Run:
         if (root / folder.MANIFEST).exists():
             self.manifest = manifests.read_manifest(root)
             manifests.refuse_other(root, self.manifest, recipe)
-        whole = folder.whole_rooms(root)
+        whole, frames = folder.whole_rooms(root), len(recipe.rendered_views())
         self.frames_of: Counter[int] = Counter()
         self.progress = Progress(
             rooms=recipe.rooms,
-            frames=recipe.rooms * recipe.views,
+            frames=recipe.rooms * frames,
             rooms_before=len(whole),
-            frames_before=len(whole) * recipe.views,
+            frames_before=len(whole) * frames,
             rooms_done=len(whole),
-            frames_done=len(whole) * recipe.views,
+            frames_done=len(whole) * frames,
         )
         rejected = {int(room): why for room, why in (self.manifest or {}).get("rejected_rooms", {}).items()}
         self.progress.rejected_rooms.update(rejected)

@@ -156,7 +156,7 @@ def _hired(work: Work) -> _Worker:
 def _worker(connection: Connection, work: Work) -> None:
     """Body of a worker process: set up, then a room after another until the other end closes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the main process decides
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    threading.Thread(target=end_with_parent, daemon=True).start()
     room: int | None = None
     try:
         connection.send(("ready", work.setup()))
@@ -175,7 +175,8 @@ def _worker(connection: Connection, work: Work) -> None:
             connection.send(("failed", _explained(problem, room)))
 
 
-def _end_with_parent() -> None:
+def end_with_parent() -> None:
+    """Body of a thread that ends this process when the one that spawned it ends, however it does."""
     parent = multiprocessing.parent_process()
     assert parent is not None
     wait([parent.sentinel])

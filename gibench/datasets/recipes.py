@@ -53,6 +53,12 @@ class Recipe(BaseModel):
     spp_cap: int = Field(
         4096, ge=64, le=2**20, description="an integer from 64 to 1048576 (most samples for error)"
     )
+    sample_seed: int = Field(
+        0,
+        ge=0,
+        lt=2**32,
+        description="an integer from 0 to 2³²−1 (another one gives the same rooms with independent noise)",
+    )
     max_depth: int = Field(8, ge=1, le=1000, description="an integer from 1 to 1000 (scattering events)")
     denoise: bool = Field(True, description="true or false")
     channels: Names = Field(
@@ -63,6 +69,15 @@ class Recipe(BaseModel):
     )
     path: Literal["stills", "walk", "orbit", "eight"] = Field(
         "stills", description='"stills", "walk", "orbit" or "eight" (the frames of a room lie on that path)'
+    )
+    path_views: int = Field(
+        0,
+        ge=0,
+        le=9999,
+        description="an integer from 0 to 9999 (frames on the path beside the views, which are then stills)",
+    )
+    rendered: Literal["all", "stills", "path"] = Field(
+        "all", description='"all", "stills" or "path" (which of the frames of a room are rendered)'
     )
     splits: dict[str, float] = Field(
         {"train": 0.8, "validation": 0.1, "test": 0.1},
@@ -87,6 +102,21 @@ class Recipe(BaseModel):
                 "single", "channel color_se needs spp from 2 on; raise spp, or name channels without color_se"
             )
         return self
+
+    @model_validator(mode="after")
+    def _frames_that_can_be(self) -> Self:
+        if self.path_views and self.path == "stills":
+            raise PydanticCustomError("path", "path_views needs a path: set path to walk, orbit or eight")
+        if self.rendered != "all" and not self.path_views:
+            raise PydanticCustomError(
+                "rendered", f'rendered is "{self.rendered}", but only rooms with path_views have both kinds'
+            )
+        return self
+
+    def rendered_views(self) -> range:
+        """Numbers of the views of a room that are rendered: stills first, then those on the path beside them."""
+        first = self.views if self.rendered == "path" else 0
+        return range(first, self.views if self.rendered == "stills" else self.views + self.path_views)
 
     @field_validator("kinds")
     @classmethod
@@ -122,6 +152,11 @@ class Recipe(BaseModel):
         it cannot be read.
         """
         values = self.model_dump(mode="json", exclude={"rooms"})
+        # Datasets that were begun before these keys existed hold the same frames.
+        if not self.path_views:
+            del values["path_views"], values["rendered"]
+        if not self.sample_seed:
+            del values["sample_seed"]
         if self.environment not in ENVIRONMENTS:
             values["environment"] = f"sha256:{file_sha256(Path(self.environment))}"
         return values

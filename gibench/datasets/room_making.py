@@ -69,9 +69,10 @@ class Renderer:
         }
 
 
-def frame_seed(seed: int, room: int, view: int) -> int:
-    """Seed of a frame's samples: 32 bits that depend on the dataset's seed, the room and the view alone."""
-    return int(np.random.SeedSequence(seed, spawn_key=(room, RENDER_LANE, view)).generate_state(1)[0])
+def frame_seed(recipe: Recipe, room: int, view: int) -> int:
+    """Seed of a frame's samples: 32 bits that depend on the recipe's two seeds, the room and the view alone."""
+    lane = (room, RENDER_LANE, view, *([recipe.sample_seed] if recipe.sample_seed else []))
+    return int(np.random.SeedSequence(recipe.seed, spawn_key=lane).generate_state(1)[0])
 
 
 def sampled_room(recipe: Recipe, room: int) -> Room:
@@ -84,6 +85,7 @@ def sampled_room(recipe: Recipe, room: int) -> Room:
         kinds=recipe.kinds,
         views=recipe.views,
         path=None if recipe.path == "stills" else recipe.path,
+        path_views=recipe.path_views,
         environment=None if recipe.environment == "auto" else recipe.environment,
     )
 
@@ -110,7 +112,7 @@ def rendered_frame(recipe: Recipe, scene: Any, room: Room, view: int, **settings
         **{
             "resolution": recipe.resolution,
             "channels": recipe.channels,
-            "seed": frame_seed(recipe.seed, room.index, view),
+            "seed": frame_seed(recipe, room.index, view),
             "max_depth": recipe.max_depth,
             "denoise": recipe.denoise,
             "previous_camera": pinhole(before) if before is not None and follows else None,
@@ -180,7 +182,7 @@ class RoomMaker:
         # Compressing and writing a frame goes on while the next one renders. One frame at most waits for it,
         # so memory does not grow with the number of views.
         with ThreadPoolExecutor(max_workers=1) as writer:
-            for view in range(len(room.cameras)):
+            for view in self.recipe.rendered_views():
                 rendered = rendered_frame(recipe, scene, room, view)
                 report("frame", {"paths": rendered.paths, "seconds": rendered.kernel_seconds})
                 if frames:
@@ -229,7 +231,7 @@ class RoomMaker:
             "kernel_seconds": rendered.kernel_seconds,
             "denoise_seconds": rendered.denoise_seconds,
             "seconds": rendered.seconds,
-            "seed": frame_seed(self.recipe.seed, room.index, view),
+            "seed": frame_seed(self.recipe, room.index, view),
         }
 
 

@@ -85,9 +85,10 @@ def _room_problems(root: Path, record: Mapping[str, Any], recipe: Recipe, room: 
         if problem:
             yield Problem(f"{name}/{file}", problem)
     views = [frame["view"] for frame in record["frames"]]
-    if views != list(range(recipe.views)):
+    asked = recipe.rendered_views()
+    if views != list(asked):
         yield Problem(
-            f"{name}/frames.json", f"{len(views)} frames are recorded, the recipe has {recipe.views} views"
+            f"{name}/frames.json", f"{len(views)} frames are recorded, the recipe has {len(asked)} views"
         )
     for frame in record["frames"]:
         content, problem = _content(folder / frame["file"], frame)

@@ -14,6 +14,7 @@ from gibench.metrics.mae import mae as mae
 from gibench.metrics.relmse import relmse as relmse
 from gibench.metrics.smape import smape as smape
 from gibench.metrics.psnr import psnr as psnr
+from gibench.metrics.rmse_display import rmse_display as rmse_display
 from gibench.metrics.ssim import ssim as ssim
 from gibench.metrics.dssim import dssim as dssim
 from gibench.metrics.lpips import lpips as lpips

@@ -111,3 +111,22 @@ def test_missing_files_and_presets():
         load_recipe(Path("nowhere.toml"))
     with pytest.raises(RecipeError, match=r"there is no file /nowhere\.exr"):
         check_recipe({"environment": "/nowhere.exr"})
+
+
+def test_a_path_beside_stills():
+    both = Recipe(views=3, path="walk", path_views=5)
+    assert list(both.rendered_views()) == list(range(8))
+    assert list(both.model_copy(update={"rendered": "stills"}).rendered_views()) == [0, 1, 2]
+    assert list(both.model_copy(update={"rendered": "path"}).rendered_views()) == [3, 4, 5, 6, 7]
+    assert list(Recipe(views=3, path="walk").rendered_views()) == [0, 1, 2]
+    assert both.identity()["path_views"] == 5
+    with pytest.raises(
+        RecipeError, match="recipe: path_views needs a path: set path to walk, orbit or eight"
+    ):
+        check_recipe({"path_views": 2})
+    with pytest.raises(RecipeError, match='rendered is "path", but only rooms with path_views have both'):
+        check_recipe({"path": "walk", "rendered": "path"})
+
+
+def test_datasets_begun_before_there_were_paths_beside_stills_can_be_continued():
+    assert not {"path_views", "rendered"} & Recipe(path="walk").identity().keys()

@@ -1,4 +1,4 @@
-"""psnr, ssim and dssim against scikit-image and plain loops, and the properties that they must have."""
+"""psnr, rmse_display, ssim and dssim against scikit-image and plain loops, and the properties that they must have."""
 
 import itertools
 import math
@@ -55,7 +55,17 @@ def test_psnr_equals_scikit_image(case):
     )
 
 
-@pytest.mark.parametrize("name", ["psnr", "ssim", "dssim"])
+@pytest.mark.parametrize("case", pairs())
+def test_rmse_display_equals_numpy(case, rng):
+    pred, ref = pairs()[case]
+    expected = np.sqrt(np.mean((pred - ref) ** 2))
+    assert metrics.rmse_display(pred, ref) == pytest.approx(expected, rel=1e-10)
+    mask = rng.random(ref.shape[:2]) < 0.5
+    expected = np.sqrt(np.mean((pred - ref)[mask] ** 2))
+    assert metrics.rmse_display(pred, ref, mask=mask) == pytest.approx(expected, rel=1e-10)
+
+
+@pytest.mark.parametrize("name", ["psnr", "rmse_display", "ssim", "dssim"])
 @pytest.mark.parametrize("case", pairs())
 def test_symmetric_in_range_and_exact_on_equal_images(name, case):
     metric = metrics.metric(name)
@@ -65,7 +75,7 @@ def test_symmetric_in_range_and_exact_on_equal_images(name, case):
     assert metric(ref, ref) == metric.identity
 
 
-@pytest.mark.parametrize("name", ["psnr", "ssim", "dssim"])
+@pytest.mark.parametrize("name", ["psnr", "rmse_display", "ssim", "dssim"])
 def test_worse_with_more_noise(name, rng):
     metric = metrics.metric(name)
     ref = 0.25 + 0.5 * rng.random((40, 40, 3))
@@ -74,7 +84,7 @@ def test_worse_with_more_noise(name, rng):
     assert all(metric.better(a, b) for a, b in itertools.pairwise(values))
 
 
-@pytest.mark.parametrize("name", ["psnr", "ssim", "dssim"])
+@pytest.mark.parametrize("name", ["psnr", "rmse_display", "ssim", "dssim"])
 def test_the_same_when_images_are_mirrored_or_transposed(name, rng):
     metric = metrics.metric(name)
     ref, pred = rng.random((2, 24, 31, 3))
@@ -129,7 +139,7 @@ def test_psnr_of_one_pixel():
     assert metrics.psnr(np.full((1, 1, 3), 0.5), np.full((1, 1, 3), 0.6)) == pytest.approx(20.0)
 
 
-@pytest.mark.parametrize("name", ["psnr", "ssim", "dssim"])
+@pytest.mark.parametrize("name", ["psnr", "rmse_display", "ssim", "dssim"])
 def test_batch_equals_its_frames(name, rng):
     metric = metrics.metric(name)
     ref, pred = rng.random((2, 3, 20, 17, 3))

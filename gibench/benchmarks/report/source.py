@@ -1,0 +1,72 @@
+"""What a report is made from: the tables and images of a run, as `gibench.benchmarks.results` reads them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gibench.errors import GibenchError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+PREPARATION = ("lightmap", "probes", "references", "training")
+"""What preparation is booked as; the columns are prepare_<name>_s."""
+
+PARTS = {"full": "Full image", "specular": "Specular part"}
+"""What is scored of an image, and how a reader is told."""
+
+
+class ReportError(GibenchError):
+    """A report that cannot be made from these results, or not as asked."""
+
+
+class ReportSource(Protocol):
+    """A run's tables, and its images when they are asked for.
+
+    run: track, preset, seed, machine (a mapping), created. results: a row a result, that is (scene, method, knobs,
+    seed). stages: milliseconds per frame by result and stage. frames: metric values by result, frame and part.
+    sequences: values of metrics in time by result and part. floor: what each metric says of a second,
+    independent reference, by scene, frame and part.
+    """
+
+    @property
+    def root(self) -> Path:
+        """Where the results lie."""
+
+    @property
+    def run(self) -> Mapping[str, Any]:
+        """What was run, where and when."""
+
+    @property
+    def results(self) -> pd.DataFrame:
+        """Columns result, track, scene, method, title, family, label, knobs, seed, status, reason, ms_median, …"""
+
+    @property
+    def stages(self) -> pd.DataFrame:
+        """Columns result, stage, ms_median, ms_p95."""
+
+    @property
+    def frames(self) -> pd.DataFrame:
+        """Columns result, frame, ms, metric, part, value."""
+
+    @property
+    def sequences(self) -> pd.DataFrame:
+        """Columns result, metric, part, value."""
+
+    @property
+    def floor(self) -> pd.DataFrame:
+        """Columns scene, frame, metric, part, value."""
+
+    def prediction(self, result: str, frame: int, part: str) -> NDArray[np.float32]:
+        """What a method said, (H, W, 3), linear radiance."""
+
+    def reference(self, scene: str, frame: int, part: str) -> NDArray[np.float32]:
+        """What is right, (H, W, 3), linear radiance."""
+
+    def exposure(self, scene: str) -> float:
+        """The factor from radiance to display values of a scene's path."""

@@ -1,0 +1,41 @@
+"""From a run to everything that is read of it: CSV files, tables, plots, and the page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from gibench.benchmarks.report.source import ReportError, ReportSource
+
+
+def write_report(results: ReportSource, out: Path, *, against: str | None = None) -> Path:
+    """Write leaderboard.csv, frames.csv, stages.csv and more, tables/, plots/, and index.html with its images.
+
+    against: the label of a setting, or a method with one setting, that differences are taken against.
+
+    Returns: the path of index.html, which is written last.
+
+    Raises:
+        ReportError: for a run without results, or an `against` that is not there.
+        GibenchError: where a result's images cannot be read.
+        OSError: when the disk is full.
+    """
+    try:
+        import jinja2  # noqa: F401
+        import matplotlib  # noqa: F401
+    except ImportError as problem:
+        raise ReportError(f"a report needs {problem.name}: pip install 'gibench[bench]'") from problem
+    from gibench.benchmarks.report.csv_files import write_csv_files
+    from gibench.benchmarks.report.image_files import write_images
+    from gibench.benchmarks.report.page import write_page
+    from gibench.benchmarks.report.plots import write_plots
+    from gibench.benchmarks.report.summary import summarise
+    from gibench.benchmarks.report.tables import write_tables
+
+    summary = summarise(results, against=against)
+    for folder in (out, out / "tables", out / "plots"):
+        folder.mkdir(parents=True, exist_ok=True)
+    write_csv_files(results, summary, out)
+    write_tables(results, summary, out / "tables")
+    write_plots(results, summary, out / "plots")
+    write_images(results, summary.results[summary.results["status"] == "ok"], out)
+    return write_page(results, summary, out)

@@ -1,0 +1,195 @@
+"""The folder of a run: where everything lies, and how a result is keyed, written and read.
+
+RESULTS/run.json                    track, preset, scenes, machines, and what every command did
+RESULTS/scenes/reference/           the dataset of the frames on the paths; scenes/reference-again: the same frames with
+                                    independent samples; scenes/training: that of the views
+RESULTS/bakes/room-000000/          what methods prepared
+RESULTS/results/<id>.json           a result, never changed once it is written
+RESULTS/results/<id>/0000.exr       what it predicted
+RESULTS/set-aside/<id>-<n>.json     failed results that were tried again
+RESULTS/scores/<id>.json            metrics of a result; scores/room-000000.json: of the reference's own noise
+RESULTS/logs/                       what the process of a result that failed wrote to the terminal
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import gibench
+from gibench.benchmarks.errors import ResultsError
+from gibench.datasets.errors import FolderError
+from gibench.datasets.files import as_json, sync_folder, write_whole
+from gibench.datasets.folder import lock_folder, unlock_folder
+
+#: Version of the layout on disk; a reader refuses what it does not know.
+FORMAT = 1
+
+RUN = "run.json"
+
+
+def canonical(config: Mapping[str, Any]) -> bytes:
+    """The one way to write a configuration, whatever the order of its keys."""
+    return json.dumps(config, sort_keys=True, separators=(",", ":"), ensure_ascii=False).encode()
+
+
+def key_of(config: Mapping[str, Any]) -> str:
+    """SHA-256 of the canonical configuration, hexadecimal; its first 16 digits are the id of the result."""
+    return hashlib.sha256(canonical(config)).hexdigest()
+
+
+class RunFolder:
+    """Places in a folder of results."""
+
+    def __init__(self, root: Path) -> None:
+        """root: need not exist."""
+        self.root = root
+        self.run_file = root / RUN
+        self.results = root / "results"
+        self.scores = root / "scores"
+        self.logs = root / "logs"
+        self.set_aside = root / "set-aside"
+
+    def dataset(self, which: str) -> Path:
+        """which: "training", "reference" or "reference-again"."""
+        return self.root / "scenes" / which
+
+    @property
+    def references(self) -> tuple[Path, Path]:
+        """The datasets of the frames on the paths: rendered once, and once more with other samples."""
+        return self.dataset("reference"), self.dataset("reference-again")
+
+    def bakes(self, scene: str) -> Path:
+        """Of a scene, shared by all methods."""
+        return self.root / "bakes" / scene
+
+    def result_file(self, id: str) -> Path:
+        """What is known of a result."""
+        return self.results / f"{id}.json"
+
+    def predictions(self, id: str) -> Path:
+        """Folder of its frames."""
+        return self.results / id
+
+    def partial(self, id: str) -> Path:
+        """Where its frames are gathered until all are there."""
+        return self.results / f".{id}.partial"
+
+    def score_file(self, name: str) -> Path:
+        """name: the id of a result, or that of a scene for the reference's own noise."""
+        return self.scores / f"{name}.json"
+
+    @contextmanager
+    def claimed(self) -> Iterator[None]:
+        """Hold the folder for one command alone, made where it does not exist; leftovers of killed ones go.
+
+        Raises FolderError: it cannot be written, holds something else, or is in use.
+        """
+        try:
+            self.root.mkdir(parents=True, exist_ok=True)
+            foreign = [e.name for e in self.root.iterdir() if not e.name.startswith(".")]
+            if foreign and not self.run_file.exists():
+                raise FolderError(
+                    f"{self.root} holds files but no results ({sorted(foreign)[0]} …): choose an empty or a new "
+                    "folder with --out"
+                )
+            lock = lock_folder(self.root)
+        except OSError as problem:
+            raise FolderError(
+                f"{self.root} cannot be written ({problem.strerror}): choose another folder with --out"
+            ) from None
+        try:
+            self.remove_partials()
+            yield
+        finally:
+            self.remove_partials()
+            unlock_folder(self.root, lock)
+
+    def remove_partials(self) -> None:
+        """Remove what killed processes left; only for the holder of the lock."""
+        for left in self.results.glob(".*.partial*"):
+            shutil.rmtree(left, ignore_errors=True) if left.is_dir() else left.unlink(missing_ok=True)
+        for place in (self.root, self.scores):
+            for left in place.glob(".*.partial-*"):
+                left.unlink(missing_ok=True)
+        for left in self.results.iterdir() if self.results.is_dir() else ():
+            if left.is_dir() and not self.result_file(left.name).exists():
+                shutil.rmtree(left, ignore_errors=True)
+
+    def write_result(self, record: Mapping[str, Any]) -> None:
+        """Write a result, and move its frames to their place where it has some. Raises OSError."""
+        self.results.mkdir(exist_ok=True)
+        partial = self.partial(record["id"])
+        if record["status"] == "ok":
+            os.replace(partial, self.predictions(record["id"]))
+            sync_folder(self.results)
+        else:
+            shutil.rmtree(partial, ignore_errors=True)
+        write_whole(self.result_file(record["id"]), as_json(record))
+
+    def put_aside(self, id: str) -> None:
+        """Make way for another try of a failed result; what it said is kept."""
+        self.set_aside.mkdir(exist_ok=True)
+        number = sum(1 for _ in self.set_aside.glob(f"{id}-*.json"))
+        os.replace(self.result_file(id), self.set_aside / f"{id}-{number}.json")
+
+    def ids(self) -> list[str]:
+        """Of all results."""
+        return sorted(path.stem for path in self.results.glob("*.json") if not path.name.startswith("."))
+
+    def read_result(self, id: str) -> dict[str, Any]:
+        """Read a result and check that it is whole. Raises ResultsError: damaged, or of another format."""
+        path = self.result_file(id)
+        record = read_json(path, f"remove {path} and {self.predictions(id)}, then run the same command again")
+        _refuse_other_format(path, record)
+        try:
+            whole = record["id"] == id == record["key"][:16] and key_of(record["config"]) == record["key"]
+        except (KeyError, TypeError):
+            whole = False
+        if not whole:
+            raise ResultsError(
+                f"{path} is damaged: it does not say what its name does; remove it and {self.predictions(id)}, then "
+                "run the same command again"
+            )
+        return record
+
+    def read_run(self) -> dict[str, Any]:
+        """Read `run.json`. Raises ResultsError: no such folder, damaged, or of another format."""
+        if not self.run_file.is_file():
+            raise ResultsError(
+                f"{self.root} holds no results: it has no {RUN}; `gibench bench run` makes them"
+            )
+        run = read_json(self.run_file, "what it said is lost: run again into a new folder")
+        _refuse_other_format(self.run_file, run)
+        return run
+
+    def write_run(self, run: Mapping[str, Any]) -> None:
+        """Write `run.json`. Raises OSError."""
+        write_whole(self.run_file, as_json(run))
+
+
+def read_json(path: Path, remedy: str) -> dict[str, Any]:
+    """Read a JSON object. Raises ResultsError with `remedy` for what is cut off or something else."""
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as problem:
+        reason = problem.strerror if isinstance(problem, OSError) else "it is cut off or no JSON"
+        raise ResultsError(f"{path} is damaged ({reason}): {remedy}") from None
+    if not isinstance(content, dict):
+        raise ResultsError(f"{path} is damaged (it is no table): {remedy}")
+    return content
+
+
+def _refuse_other_format(path: Path, content: Mapping[str, Any]) -> None:
+    if content.get("format") != FORMAT:
+        version = content.get("gibench", "of unknown version")
+        raise ResultsError(
+            f"{path} is of format {content.get('format')}, this gibench {gibench.__version__} reads format {FORMAT}: "
+            f"read it with the gibench that wrote it ({version}), or run again into a new folder"
+        )

@@ -1,0 +1,333 @@
+"""Scoring: metrics of predictions that lie on disk, computed once each, so that a new metric needs no rerun.
+
+All frames of a path are seen under one exposure, that of its references, the specular part too. What the reference's
+own noise costs is scored beside. A reference is the mean of two renderings a and b of the same variance, so its own
+error has the variance of (a − b)/2 = a − reference: metric(a, reference) is what a perfect method would get.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import multiprocessing
+import os
+import signal
+import warnings
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import gibench
+from gibench import metrics
+from gibench.benchmarks import predictions
+from gibench.benchmarks.errors import ResultsError, RunError
+from gibench.benchmarks.result_files import FORMAT, RunFolder, read_json
+from gibench.benchmarks.scenes import SceneFiles, scenes_in
+from gibench.datasets.files import as_json, write_whole
+from gibench.datasets.making import default_threads
+from gibench.errors import GibenchError
+
+Image = NDArray[np.float32]
+Frames = Callable[[int], dict[str, Image]]  # frame → part → image
+
+
+@dataclass(frozen=True)
+class Scored:
+    """What scoring came to. done: score files that were written or completed. skipped: metric → why, each with how
+    many results it concerns. problems: results that cannot be read, one line each."""
+
+    done: int
+    skipped: dict[str, tuple[str, int]]
+    problems: tuple[str, ...]
+
+
+def score(
+    folder: RunFolder,
+    *,
+    more: Sequence[str] = (),
+    on_progress: Callable[[int, int], None] = lambda done, of: None,
+) -> Scored:
+    """Compute what is missing of the metrics of all results of a run.
+
+    more: metrics beside those of the track. on_progress: called with (done, of). Raises ResultsError,
+    UnknownMetricError, RunError where a process dies.
+    """
+    run = folder.read_run()
+    names = tuple(dict.fromkeys([*run["metrics"], *run["sequence_metrics"], *more]))
+    for name in names:
+        metrics.metric(name)  # an unknown one is named here, before any work
+    unusable = _unusable(names)
+    scenes = {scene.name: scene for scene in scenes_in(*folder.references)}
+    owners: list[tuple[str, SceneFiles]] = []
+    problems: list[str] = []
+    for id in folder.ids():
+        try:
+            record = folder.read_result(id)
+        except ResultsError as damage:
+            problems.append(str(damage))
+            continue
+        if record["status"] == "ok":
+            scene = scenes.get(record["config"]["scene"])
+            if scene is None or scene.sha256 != record["config"]["scene_sha256"]:
+                problems.append(
+                    f"{folder.result_file(id)} is of a scene that is not here any more: its dataset was made anew"
+                )
+                continue
+            owners.append((id, scene))
+    used = sorted({scene.name for _, scene in owners})
+    exposures = {name: exposure_of(folder, scenes[name]) for name in used}
+    units = [
+        _Unit(folder, id, scene, names, unusable, exposures[scene.name])
+        for id, scene in [*owners, *((None, scenes[name]) for name in used)]
+    ]
+    wanting = [unit for unit in units if unit.missing()]
+    on_progress(0, len(wanting))
+    skipped: Counter[tuple[str, str]] = Counter()
+    for number, (reasons, problem) in enumerate(_each(wanting), 1):
+        skipped.update(reasons.items())
+        if problem:
+            problems.append(problem)
+        on_progress(number, len(wanting))
+    return Scored(
+        len(wanting), {name: (why, count) for (name, why), count in skipped.items()}, tuple(problems)
+    )
+
+
+def _unusable(names: Iterable[str]) -> dict[str, str]:
+    """Metrics that cannot be computed here, and why: nothing is fetched behind the user's back."""
+    wanted = [name for name in names if name.startswith("lpips")]
+    if not wanted:
+        return {}
+    for package in ("torch", "lpips"):
+        if importlib.util.find_spec(package) is None:
+            return dict.fromkeys(wanted, f"{package} is not installed: pip install 'gibench[bench]'")
+    state = metrics.weights_state()
+    if state.state != "cached":
+        return dict.fromkeys(wanted, f"its weights are {state.state}: {state.command}")
+    return {}
+
+
+def _each(units: Sequence[_Unit]) -> Iterable[tuple[dict[str, str], str]]:
+    """Score units, in as many processes as there are cores."""
+    workers = min(default_threads(1), len(units))
+    if workers <= 1:
+        yield from map(_scored, units)
+        return
+    context = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_one_thread)
+    try:
+        for future in as_completed([pool.submit(_scored, unit) for unit in units]):
+            yield future.result()
+    except BrokenProcessPool:
+        raise RunError(
+            "a process that scores was killed (out of memory?): `gibench bench score` continues"
+        ) from None
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _one_thread() -> None:
+    # One process a core: torch with all cores in each of them would be slower.
+    os.environ["OMP_NUM_THREADS"] = "1"
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the main process decides
+
+
+@dataclass(frozen=True)
+class _Unit:
+    """One score file: of a result, or with id None of the reference's own noise."""
+
+    folder: RunFolder
+    id: str | None
+    scene: SceneFiles
+    names: tuple[str, ...]
+    unusable: dict[str, str]
+    exposure: float
+
+    def read(self) -> dict[str, Any]:
+        """The file so far."""
+        name = self.id or self.scene.name
+        empty = {"format": FORMAT, "frames": {}, "sequences": {}, "skipped": {}}
+        return read_scores(self.folder, name) or empty
+
+    def missing(self) -> list[str]:
+        """Metrics that the file lacks and that can be computed, or whose reason to be skipped it does not give."""
+        scores = self.read()
+        known = {
+            metric for group in ("frames", "sequences") for part in scores[group].values() for metric in part
+        }
+        return [
+            name
+            for name in self.names
+            if name not in known and (name not in scores["skipped"] or name not in self.unusable)
+        ]
+
+
+def read_scores(folder: RunFolder, name: str) -> dict[str, Any] | None:
+    """A score file, None where there is none. name: id of a result, or a scene's. Raises ResultsError."""
+    path = folder.score_file(name)
+    if not path.exists():
+        return None
+    content = read_json(path, f"remove it and run `gibench bench score {folder.root}`")
+    if content.get("format") != FORMAT:
+        raise ResultsError(
+            f"{path} is of format {content.get('format')}, this gibench reads {FORMAT}: remove it and run "
+            f"`gibench bench score {folder.root}`"
+        )
+    return content
+
+
+def _scored(unit: _Unit) -> tuple[dict[str, str], str]:
+    """Complete a score file; returns metric → why it was skipped, and what is wrong with the result, if anything."""
+    scores, missing = unit.read(), unit.missing()
+    skipped = {name: unit.unusable[name] for name in missing if name in unit.unusable}
+    frames = (
+        (lambda frame: half_parts(unit.scene, 0, frame))
+        if unit.id is None
+        else _predicted(unit.folder, unit.id)
+    )
+    chosen = [metrics.metric(name) for name in missing if name not in skipped]
+    try:
+        new = compute(
+            frames,
+            unit.scene,
+            [d.name for d in chosen if d.inputs == "image"],
+            [d.name for d in chosen if d.inputs == "sequence"],
+            unit.exposure,
+        )
+    except GibenchError as problem:
+        return {}, str(problem)
+    for group in ("frames", "sequences"):
+        for part, values in new[group].items():
+            scores[group].setdefault(part, {}).update(values)
+    skipped |= new["skipped"]
+    scores["skipped"] = {
+        name: why for name, why in {**scores["skipped"], **skipped}.items() if name not in new["done"]
+    }
+    scores |= {"gibench": gibench.__version__, "exposure": unit.exposure}
+    unit.folder.scores.mkdir(exist_ok=True)
+    write_whole(unit.folder.score_file(unit.id or unit.scene.name), as_json(_finite(scores)))
+    return skipped, ""
+
+
+def _finite(value: Any) -> Any:
+    """Numbers that JSON lacks as None: a frame of which nothing was visible before, equal images in decibels."""
+    if isinstance(value, dict):
+        return {key: _finite(inner) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [_finite(inner) for inner in value]
+    return None if isinstance(value, float) and not np.isfinite(value) else value
+
+
+def exposure_of(folder: RunFolder, scene: SceneFiles) -> float:
+    """The exposure that a whole path is seen under: `reference_exposure` of its references, shared."""
+    known = read_scores(folder, scene.name)
+    if known is not None:
+        return float(known["exposure"])
+    references = np.stack([reference_parts(scene, frame)["full"] for frame in range(len(scene.cameras))])
+    return float(metrics.reference_exposure(references, shared=True))
+
+
+def reference_parts(scene: SceneFiles, frame: int) -> dict[str, Image]:
+    """What predictions are scored against: "full" and "specular", (H, W, 3)."""
+    first, second = (half_parts(scene, which, frame) for which in (0, 1))
+    return {part: 0.5 * (image + second[part]) for part, image in first.items()}
+
+
+def half_parts(scene: SceneFiles, which: int, frame: int) -> dict[str, Image]:
+    """The same of one of the two renderings of the reference."""
+    read = scene.half(which, frame, "color", "direct_specular", "indirect_specular")
+    return {"full": read["color"], "specular": read["direct_specular"] + read["indirect_specular"]}
+
+
+def _predicted(folder: RunFolder, id: str) -> Frames:
+    return lambda frame: predictions.read(folder.predictions(id) / f"{frame:04d}.exr")
+
+
+def compute(
+    frames: Frames, scene: SceneFiles, image: Sequence[str], sequence: Sequence[str], exposure: float
+) -> dict[str, Any]:
+    """Compute metrics of all frames of a scene, two frames in memory at a time.
+
+    Returns "frames": part → metric → a value a frame; "sequences": part → metric → the mean over the steps of the
+    path, with "_prediction" and "_reference" beside (see `evaluate_sequence`); "skipped": metric → why; "done".
+    """
+    values: dict[str, dict[str, list[float]]] = {}
+    steps: dict[str, dict[str, list[float]]] = {}
+    skipped: dict[str, str] = {}
+    before: _Step | None = None
+    for number in range(len(scene.cameras)):
+        now = _Step(frames(number), reference_parts(scene, number), scene, number if sequence else None)
+        for part, pred in now.predicted.items():
+            if number == 0 and not values:
+                skipped |= _impossible(pred, image)
+            possible = [name for name in image if name not in skipped]
+            row = metrics.evaluate(pred, now.references[part], metrics=possible, exposure=exposure)
+            for name in possible:
+                values.setdefault(part, {}).setdefault(name, []).append(float(np.float64(row[name])))
+            if sequence and before is not None:
+                for name, value in _step(before, now, part, sequence, exposure).items():
+                    steps.setdefault(part, {}).setdefault(name, []).append(value)
+        before = now
+    sequences = {part: {name: _mean(row) for name, row in rows.items()} for part, rows in steps.items()}
+    if len(scene.cameras) < 2:
+        skipped |= dict.fromkeys(sequence, "the path has one frame")
+    return {
+        "frames": values,
+        "sequences": sequences,
+        "skipped": skipped,
+        "done": [name for name in [*image, *sequence] if name not in skipped],
+    }
+
+
+def _impossible(image: Image, names: Sequence[str]) -> dict[str, str]:
+    """Metrics that images of this size have no value of, and why."""
+    reasons = {}
+    for name in names:
+        try:
+            metrics.evaluate(image, image, metrics=[name], exposure=1.0)
+        except (metrics.ImageTooSmallError, metrics.WeightsError, metrics.MissingDependencyError) as why:
+            reasons[name] = str(why)
+    return reasons
+
+
+class _Step:
+    """A frame with what the temporal metrics need of it."""
+
+    def __init__(
+        self, predicted: dict[str, Image], references: dict[str, Image], scene: SceneFiles, frame: int | None
+    ) -> None:
+        self.predicted, self.references = predicted, references
+        if frame is not None:
+            read = scene.half(0, frame, "position", "shape_id", "motion", "motion_valid")
+            self.position, self.ids = read["position"], read["shape_id"][..., 0]
+            self.motion, self.valid = read["motion"], read["motion_valid"][..., 0] > 0
+
+
+def _step(before: _Step, now: _Step, part: str, names: Sequence[str], exposure: float) -> dict[str, float]:
+    motion = np.stack([before.motion, now.motion])
+    visible = metrics.visibility(
+        motion, np.stack([before.ids, now.ids]), np.stack([before.position, now.position])
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter(
+            "ignore", metrics.EmptyMaskWarning
+        )  # NaN says the same, and is left out of the mean
+        row = metrics.evaluate_sequence(
+            np.stack([before.predicted[part], now.predicted[part]]),
+            np.stack([before.references[part], now.references[part]]),
+            metrics=names,
+            motion=motion,
+            visible=visible & np.stack([before.valid, now.valid]),
+            exposure=exposure,
+        )
+    return {name: float(value) for name, value in row.items() if name != "exposure"}
+
+
+def _mean(values: Sequence[float]) -> float:
+    known = [value for value in values if not np.isnan(value)]
+    return float(np.mean(known)) if known else float("nan")

@@ -1,0 +1,159 @@
+"""Means over rooms with their intervals, and paired differences: which method is better, and how sure that is.
+
+Rooms are what is drawn at random; frames of a room resemble each other, so intervals come from drawing rooms, then
+frames inside them (`gibench.metrics.mean_interval`). Several seeds of a trained method are frames of the same room.
+Errors do not depend on the machine and are pooled over machines; times are not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from gibench.benchmarks.errors import ResultsError
+from gibench.benchmarks.results import WHOLE_PATH, Results
+from gibench.datasets.errors import nearest
+from gibench.metrics import METRICS, Interval, mean_interval, metric, paired_difference
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Verdict = Literal["better", "worse", "unsure", "below the noise floor"]
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A method against another on the same frames, first less second.
+
+    interval: of the mean difference, 95 %. floor: the difference that the noise of the references alone could explain;
+    NaN where it is not known. verdict: of the first: "better" or "worse" only where the interval excludes zero and the
+    difference is above the floor.
+    """
+
+    first: str
+    second: str
+    metric: str
+    part: str
+    interval: Interval
+    floor: float
+    verdict: Verdict
+
+
+def frame_values(results: Results, name: str, part: str) -> pd.DataFrame:
+    """A row a frame, or for a temporal metric a row a path: label, method, scene, frame, seed, machine, value.
+
+    Undefined values are left out. Raises UnknownMetricError, ResultsError where the metric was not computed.
+    """
+    temporal = metric(name).inputs == "sequence"
+    table = results.sequences.assign(frame=WHOLE_PATH) if temporal else results.frames
+    table = table[(table["metric"] == name) & (table["part"] == part)]
+    columns = ["result", "label", "method", "scene", "seed", "machine"]
+    table = table.merge(results.results[columns], on="result").dropna(subset="value")
+    if table.empty:
+        why = results.skipped.get(name, f"`gibench bench score {results.root}` computes it")
+        raise ResultsError(f"{results.root} has no {name} of the {part} image: {why}")
+    return table[["label", "method", "scene", "frame", "seed", "machine", "value"]]
+
+
+def floor(results: Results, name: str, part: str) -> float:
+    """What the noise of the references costs a perfect method, as a distance from the perfect value.
+
+    The mean over scenes of their frames' means. NaN where it is not known: for the specular part, and for metrics whose
+    perfect value is none or infinite.
+    """
+    identity = METRICS[name].identity
+    table = results.floor
+    table = table[(table["metric"] == name) & (table["part"] == part)].dropna(subset="value")
+    if identity is None or not np.isfinite(identity) or table.empty:
+        return float("nan")
+    return float((table["value"] - identity).abs().groupby(table["scene"]).mean().mean())
+
+
+def leaderboard(results: Results, name: str, part: str = "full") -> pd.DataFrame:
+    """A row a label and machine, best first.
+
+    Columns: label, method, title, family, machine, mean, low, high (of the metric, 95 %), rooms, ms and ms_p95 (means
+    over results of the median and the 95th percentile), prepare_s, bytes, peak_mb (means over results), failed
+    (results that failed). Times of different machines stand in different rows. A label whose results all failed has
+    NaN and comes last.
+    """
+    import pandas as pd
+
+    values = frame_values(results, name, part)
+    rows = []
+    for (label, machine), group in results.results.groupby(["label", "machine"], sort=False):
+        own = values[(values["label"] == label) & (values["machine"] == machine)]
+        interval = mean_interval(own["value"], own["scene"]) if len(own) else None
+        good = group[group["status"] == "ok"]
+        rows.append(
+            {
+                "label": label,
+                "method": group["method"].iloc[0],
+                "title": group["title"].iloc[0],
+                "family": group["family"].iloc[0],
+                "machine": machine,
+                "mean": interval.mean if interval else float("nan"),
+                "low": interval.low if interval else float("nan"),
+                "high": interval.high if interval else float("nan"),
+                "rooms": interval.rooms if interval else 0,
+                "ms": good["ms_median"].mean(),
+                "ms_p95": good["ms_p95"].mean(),
+                "prepare_s": good["prepare_s"].mean(),
+                "bytes": good["bytes"].mean(),
+                "peak_mb": good["peak_mb"].mean(),
+                "failed": int((group["status"] != "ok").sum()),
+            }
+        )
+    lower = METRICS[name].direction == "lower"
+    table = pd.DataFrame(rows).sort_values("mean", ascending=lower, na_position="last", kind="stable")
+    return table.reset_index(drop=True)
+
+
+def labels_of(results: Results, name: str) -> list[str]:
+    """Labels that a name stands for: itself, or those of the method that it is the id of. Raises ResultsError."""
+    table = results.results
+    if name in set(table["label"]):
+        return [name]
+    labels = list(dict.fromkeys(table[table["method"] == name]["label"]))
+    if not labels:
+        known = sorted({*table["label"], *table["method"]})
+        raise ResultsError(f"{results.root} has no method '{name}'; {nearest(name, known)}")
+    return labels
+
+
+def difference(first: tuple[Results, str], second: tuple[Results, str], name: str, part: str) -> Difference:
+    """Compare two labels on the frames that both have. The two may come from different folders.
+
+    Scenes are the same where their content is. Seeds are averaged. Raises ResultsError where nothing is shared.
+    """
+    tables = [_by_frame(results, label, name, part) for results, label in (first, second)]
+    both = tables[0].merge(tables[1], on=["content", "frame"], suffixes=("_first", "_second"))
+    if both.empty:
+        raise ResultsError(
+            f"'{first[1]}' and '{second[1]}' share no frame with a {name} of the {part} image: compare runs of the "
+            "same track, preset and seed"
+        )
+    interval = paired_difference(both["value_first"], both["value_second"], both["content"])
+    noise = floor(first[0], name, part)
+    return Difference(
+        first[1], second[1], name, part, interval, noise, verdict(interval, noise, METRICS[name].direction)
+    )
+
+
+def verdict(interval: Interval, noise: float, direction: str) -> Verdict:
+    """What may be said of a difference. noise: see `Difference.floor`; NaN leaves it out."""
+    if not interval.excludes_zero:
+        return "unsure"
+    if abs(interval.mean) < noise:
+        return "below the noise floor"
+    return "better" if (interval.mean < 0) == (direction == "lower") else "worse"
+
+
+def _by_frame(results: Results, label: str, name: str, part: str) -> pd.DataFrame:
+    values = frame_values(results, name, part)
+    values = values[values["label"] == label]
+    contents = {r["config"]["scene"]: r["config"]["scene_sha256"] for r in results.records()}
+    values = values.assign(content=values["scene"].map(contents))
+    return values.groupby(["content", "frame"])["value"].mean().reset_index()

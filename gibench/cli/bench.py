@@ -1,0 +1,247 @@
+"""`gibench bench run | list | score | compare | report`."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from gibench.errors import GibenchError
+
+if TYPE_CHECKING:
+    from gibench.benchmarks.registry import Found
+    from gibench.benchmarks.results import Results
+
+app = typer.Typer(
+    help="Run, score and compare methods of real-time global illumination.", no_args_is_help=True
+)
+
+Folder = Annotated[Path, typer.Argument(metavar="RESULTS", help="The folder of a run.", show_default=False)]
+
+
+@app.command("run")
+def run_track(
+    track: Annotated[str, typer.Option(help="A track, or a TOML file of your own.")] = "walkthrough",
+    preset: Annotated[str, typer.Option(help="smoke, cpu or paper.")] = "smoke",
+    out: Annotated[Path | None, typer.Option(help="Where to.", show_default="results/TRACK-PRESET")] = None,
+    methods: Annotated[
+        str | None, typer.Option(help="Such as lightmap,path-traced.", show_default="all of the track")
+    ] = None,
+    rooms: Annotated[int | None, typer.Option(help="How many rooms.", show_default="the preset's")] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", help="METHOD.KNOB=VALUE or =VALUE,VALUE in place of the preset's; may be repeated."
+        ),
+    ] = None,
+    equal_time: Annotated[
+        float | None,
+        typer.Option(
+            help="Milliseconds a frame: find each method's dearest setting that meets it.", show_default=False
+        ),
+    ] = None,
+    seeds: Annotated[
+        str | None, typer.Option(help="Such as 0,1,2, for trained methods.", show_default="the preset's")
+    ] = None,
+    variant: Annotated[str, typer.Option(help="Mitsuba's, or auto: the fastest that works.")] = "auto",
+    retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Try failed results again.")] = False,
+    no_score: Annotated[
+        bool, typer.Option("--no-score", help="Leave scoring to `gibench bench score`.")
+    ] = False,
+) -> None:
+    """Bake, time and score methods on a track, or continue such a run."""
+    from gibench.benchmarks.equal_time import search
+    from gibench.benchmarks.errors import RunError, TrackError
+    from gibench.benchmarks.running import Order, Run, ordered_methods, run
+    from gibench.benchmarks.scoring import Scored, score
+    from gibench.benchmarks.settings import parse_overrides
+    from gibench.benchmarks.track import load_track
+    from gibench.cli import bench_telling as telling
+    from gibench.cli.dataset import check_variant
+    from gibench.cli.progress import counting
+
+    chosen = load_track(track)
+    chosen.preset(preset)
+    check_variant(variant)
+    for option, value in (("--rooms", rooms), ("--equal-time", equal_time)):
+        if value is not None and not value > 0:
+            raise TrackError(f"{option}: {value:g} is not allowed; allowed is a number above 0")
+    found = _methods(methods, chosen.id, chosen.preset(preset).methods)
+    overrides = parse_overrides(settings or (), {f.method.id: f.method for f in found})
+    root = out or Path("results") / f"{chosen.id}-{preset}"
+    given = {
+        "--track": track,
+        "--preset": preset,
+        "--out": root,
+        "--methods": methods,
+        "--rooms": rooms,
+        "--equal-time": equal_time,
+        "--seeds": seeds,
+        "--variant": None if variant == "auto" else variant,
+    }
+    words = [str(word) for option, value in given.items() if value is not None for word in (option, value)]
+    words += [word for text in settings or () for word in ("--set", text)]
+    order = Order(
+        track=chosen,
+        preset=preset,
+        methods=ordered_methods(chosen, preset, found, overrides),
+        rooms=rooms,
+        seeds=None if seeds is None else _seeds(seeds),
+        variant=variant,
+        retry_failed=retry_failed,
+        command=shlex.join(["gibench", "bench", "run", *words]),
+    )
+    scored: list[Scored] = []
+
+    def score_and_count(doing: Run) -> None:
+        with counting("results scored") as on_progress:
+            scored.append(score(doing.folder, on_progress=on_progress))
+
+    report = run(
+        root,
+        order,
+        work=None if equal_time is None else lambda doing: search(doing, equal_time),
+        score=None if no_score else score_and_count,
+        on_state=telling.Teller().tell,
+    )
+    telling.tell_run(root, report)
+    for done in scored:
+        telling.tell_scored(done)
+    if equal_time is not None:
+        telling.tell_equal_time(root, equal_time)
+    if not no_score:
+        telling.tell_board(root)
+    if report.failed:
+        raise RunError(
+            f"{len(report.failed)} results failed, `gibench bench list {root}` says why; --retry-failed tries again"
+        )
+
+
+@app.command("list")
+def list_all(
+    results: Annotated[
+        Path | None,
+        typer.Argument(metavar="[RESULTS]", help="A run, to list its results.", show_default=False),
+    ] = None,
+    track: Annotated[str | None, typer.Option(help="One track alone.", show_default=False)] = None,
+    show: Annotated[bool, typer.Option("--show", help="Print the file of --track, to be copied.")] = False,
+) -> None:
+    """List tracks and methods with their knobs, or the results of a run and why some failed."""
+    from gibench.benchmarks.errors import TrackError
+    from gibench.cli import bench_telling as telling
+
+    if results is not None:
+        telling.tell_results(results)
+    elif show:
+        if track is None:
+            raise TrackError("--show needs --track, the name of a track")
+        telling.show_track(track)
+    else:
+        telling.tell_tracks(track)
+        telling.tell_methods(track)
+
+
+@app.command("score")
+def score_results(
+    results: Folder,
+    metrics: Annotated[
+        str | None, typer.Option(help="More than the track's, such as ssim,psnr.", show_default=False)
+    ] = None,
+) -> None:
+    """Compute what is missing of the metrics, from the predictions on disk."""
+    from gibench.benchmarks.result_files import RunFolder
+    from gibench.benchmarks.scoring import score
+    from gibench.cli import bench_telling as telling
+    from gibench.cli.dataset import names_in
+    from gibench.cli.progress import counting
+
+    folder = RunFolder(results)
+    folder.read_run()
+    more = () if metrics is None else names_in(metrics, "--metrics")
+    with folder.claimed(), counting("results scored") as on_progress:
+        scored = score(folder, more=more, on_progress=on_progress)
+    typer.echo(f"{scored.done} files of scores written in {folder.scores}")
+    telling.tell_scored(scored)
+    if scored.problems:
+        raise GibenchError(f"{len(scored.problems)} results could not be scored")
+
+
+@app.command("compare")
+def compare(
+    first: Annotated[str, typer.Argument(metavar="A", help="A folder, or with --in a method.")],
+    second: Annotated[str, typer.Argument(metavar="B", help="What it is compared with.")],
+    within: Annotated[
+        Path | None, typer.Option("--in", help="Compare two methods of this run.", show_default=False)
+    ] = None,
+    metric: Annotated[str, typer.Option(help="Of two folders: the metric to compare by.")] = "rmse",
+    part: Annotated[str, typer.Option(help="Of two folders: full or specular.")] = "full",
+) -> None:
+    """Compare two runs, or two methods of one run, on the same frames."""
+    from gibench.benchmarks.errors import ResultsError
+    from gibench.benchmarks.results import load
+    from gibench.cli import bench_telling as telling
+    from gibench.metrics import metric as descriptor
+
+    if within is not None:
+        telling.tell_methods_compared(load(within), first, second)
+        return
+    descriptor(metric)
+    if part not in ("full", "specular"):
+        raise ResultsError(f"--part: '{part}' is not allowed; allowed are full and specular")
+    telling.tell_runs_compared(load(first), load(second), metric, part)
+
+
+@app.command("report")
+def report(
+    results: Folder,
+    out: Annotated[Path, typer.Option(help="Where to.", show_default=False)],
+) -> None:
+    """Write the leaderboard page, CSV files, tables and plots of a run."""
+    from gibench.benchmarks.report import write_report
+    from gibench.benchmarks.results import load
+
+    loaded: Results = load(results)
+    try:
+        write_report(loaded, out)
+    except OSError as problem:
+        raise GibenchError(f"{problem.filename or out} cannot be written: {problem.strerror}") from None
+    typer.echo(str(out / "index.html"))
+
+
+def _methods(names: str | None, track: str, plans: dict[str, Any]) -> list[Found]:
+    from gibench.benchmarks.errors import RegistryError, TrackError
+    from gibench.benchmarks.registry import installed
+    from gibench.cli.dataset import names_in
+    from gibench.datasets.errors import nearest
+
+    registry = installed()
+    if names is not None:
+        return [registry.get(name) for name in dict.fromkeys(names_in(names, "--methods"))]
+    known = [*registry.methods, *(broken.name for broken in registry.broken)]
+    for id in plans:
+        if id not in known:
+            raise TrackError(
+                f"track {track} has settings for method '{id}', which is not installed; {nearest(id, known)}"
+            )
+    for broken in registry.broken:
+        typer.echo(f"left out: {broken}", err=True)
+    found = registry.on_track(track)
+    if not found:
+        raise RegistryError(f"no installed method runs on track {track}: pip install gibench brings its own")
+    return found
+
+
+def _seeds(text: str) -> tuple[int, ...]:
+    from gibench.benchmarks.errors import TrackError
+
+    try:
+        seeds = tuple(dict.fromkeys(int(word) for word in text.split(",")))
+    except ValueError:
+        seeds = ()
+    if not seeds or min(seeds) < 0:
+        raise TrackError(
+            f"--seeds: '{text}' is not allowed; allowed are integers from 0 with commas between them"
+        )
+    return seeds

@@ -1,0 +1,245 @@
+"""What the commands of `gibench bench` say, in 80 columns."""
+
+from __future__ import annotations
+
+import textwrap
+import time
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from gibench.benchmarks import statistics
+from gibench.benchmarks.errors import ResultsError
+from gibench.benchmarks.registry import installed
+from gibench.benchmarks.results import Results, load
+from gibench.benchmarks.running import Report, State
+from gibench.benchmarks.scoring import Scored
+from gibench.benchmarks.track import load_track, track_names
+from gibench.cli.progress import QUIET_SECONDS, duration
+from gibench.errors import GibenchError
+
+#: Columns of a label; longer ones are cut.
+LABEL = 26
+
+
+class Teller:
+    """Says what a run does, a line a result."""
+
+    def __init__(self) -> None:
+        """Nothing was said yet."""
+        self._said = time.monotonic()
+
+    def tell(self, state: State) -> None:
+        """Say what is new."""
+        record = state.record
+        if record is not None:
+            place = f"[{state.done:>{len(str(state.of))}}/{state.of}] {record['config']['scene']}"
+            self._line(f"{place} {_cut(record['label'], 32):<32} {_outcome(record)}")
+        elif state.scenes is not None and time.monotonic() - self._said >= QUIET_SECONDS:
+            scenes = state.scenes
+            self._line(
+                f"scenes: rooms {scenes.rooms_done}/{scenes.rooms} frames {scenes.frames_done}/{scenes.frames}"
+            )
+
+    def _line(self, text: str) -> None:
+        self._said = time.monotonic()
+        typer.echo(text, err=True)
+
+
+def _outcome(record: dict[str, Any]) -> str:
+    if record["status"] != "ok":
+        return f"failed {record['reason']}"
+    seconds = sorted(frame["seconds"] for frame in record["frames"])
+    return f"{1000 * seconds[len(seconds) // 2]:8.1f} ms"
+
+
+def tell_run(root: Path, report: Report) -> None:
+    """Say what a run came to, and what its time went to."""
+    seconds = report.seconds
+    _row("results", f"{root} ({len(report.ids)}, of which {report.made} new, {len(report.failed)} failed)")
+    spent = {"scenes": "scenes", "prepare": "preparing", "render": "rendering", "score": "scoring"}
+    parts = ", ".join(f"{word} {duration(seconds[name])}" for name, word in spent.items())
+    text = f"{duration(seconds['total'])}: {parts}"
+    for number, line in enumerate(textwrap.wrap(text, 80 - 14)):
+        _row("time" if number == 0 else "", line)
+    share = 100 * seconds["harness"] / max(seconds["total"], 1e-9)
+    _row("harness", f"{duration(seconds['harness'])}, {share:.1f} % of the run")
+
+
+def tell_scored(scored: Scored) -> None:
+    """Say which metrics could not be computed, and why."""
+    for name, (why, count) in scored.skipped.items():
+        _row("left out", f"{name} of {count} results: {why}")
+    for problem in scored.problems:
+        typer.echo(problem, err=True)
+
+
+def tell_equal_time(root: Path, milliseconds: float) -> None:
+    """Say which settings meet a time per frame."""
+    run = load(root).run
+    for entry in run["equal_time"]:
+        if entry["ms"] == milliseconds and entry["machine"] == run["machine"]["id"]:
+            tried = ", ".join(
+                f"{value} {ms:.1f} ms" if ms is not None else f"{value} failed"
+                for value, ms in entry["tried"].items()
+            )
+            met = entry["label"] or f"{entry['method']}: no setting meets it"
+            _row(f"≤ {milliseconds:g} ms", f"{met} (measured {tried.strip()})")
+
+
+def tell_board(root: Path) -> None:
+    """Print the leaderboard of a run by its first metric."""
+    results = load(root)
+    if results.frames.empty:
+        return
+    name = results.run["metrics"][0]
+    board = statistics.leaderboard(results, name)
+    several = len(set(board["machine"])) > 1
+    typer.echo(f"\n{'method':<{LABEL}} {name:>9} {'95 % interval':>17} {'ms':>8} {'prepared':>10}")
+    for row in board.to_dict("records"):
+        if row["mean"] != row["mean"]:
+            typer.echo(f"{_cut(row['label'], LABEL):<{LABEL}}    failed in all {row['failed']} results")
+            continue
+        machine = f" {row['machine'][:6]}" if several else ""
+        typer.echo(
+            f"{_cut(row['label'], LABEL):<{LABEL}} {row['mean']:9.4f} {row['low']:8.4f} {row['high']:8.4f} "
+            f"{row['ms']:8.1f} {duration(row['prepare_s']):>10}{machine}"
+        )
+    if several:
+        typer.echo("Results of several machines: compare times within the rows of one machine alone.")
+    noise = statistics.floor(results, name, "full")
+    if noise == noise:
+        typer.echo(f"{'(noise of the references)':<{LABEL}} {noise:9.4f}")
+
+
+def tell_results(root: Path) -> None:
+    """List the results of a run, failed ones with their reasons."""
+    results = load(root)
+    table = results.results
+    for row in table.to_dict("records"):
+        outcome = f"{row['ms_median']:8.1f} ms" if row["status"] == "ok" else f"failed {row['reason']}"
+        typer.echo(f"{row['scene']} {_cut(row['label'], LABEL):<{LABEL}} {outcome}")
+    failed = int((table["status"] != "ok").sum())
+    typer.echo(f"{len(table)} results, {failed} failed; tracebacks stand in {results.folder.results}")
+
+
+def show_track(name: str) -> None:
+    """Print the file of a track that ships with gibench."""
+    load_track(name)
+    typer.echo(
+        (resources.files("gibench.benchmarks") / "tracks" / f"{name}.toml").read_text("utf-8"), nl=False
+    )
+
+
+def tell_tracks(only: str | None) -> None:
+    """List tracks and their presets."""
+    for name in track_names() if only is None else (only,):
+        track = load_track(name)
+        typer.echo(f"track {track.id}: {track.question}")
+        for preset_name, preset in track.presets.items():
+            width, height = preset.recipe("reference").resolution
+            typer.echo(
+                f"  {preset_name:<8} {preset.rooms} rooms, {preset.path_frames} frames of {width}x{height}, up to "
+                f"{preset.recipe('training').views} training views"
+            )
+
+
+def tell_methods(track: str | None) -> None:
+    """List methods and their knobs; what is broken on stderr."""
+    registry = installed()
+    for id, claims in sorted(registry.methods.items()):
+        for found in claims:
+            method = found.method
+            if track is not None and load_track(track).id not in method.tracks:
+                continue
+            typer.echo(f"method {id}: {method.title} ({method.family}; {found.package} {found.version})")
+            for knob in method.knobs:
+                values = " ".join(f"[{v}]" if v == knob.default else str(v) for v in knob.values)
+                typer.echo(f"  {knob.name:<16} {values}")
+        if len(claims) > 1:
+            packages = " and ".join(sorted(claim.package for claim in claims))
+            typer.echo(f"error: method '{id}' is claimed by {packages}", err=True)
+    for broken in registry.broken:
+        typer.echo(f"error: {broken}", err=True)
+
+
+def tell_methods_compared(results: Results, first: str, second: str) -> None:
+    """Print the paired comparison of two methods of a run, a row a metric and part."""
+    one, other = _one_label(results, first), _one_label(results, second)
+    _row("first", one)
+    _row("second", other)
+    _times(results, one, results, other)
+    _head("metric")
+    for part in results.run["parts"]:
+        for name in [*results.run["metrics"], *results.run["sequence_metrics"]]:
+            _compared(f"{name} {part}", results, one, results, other, name, part)
+
+
+def tell_runs_compared(first: Results, second: Results, name: str, part: str) -> None:
+    """Print the paired comparison of what two runs have in common, a row a label."""
+    both = [label for label in dict.fromkeys(first.results["label"]) if label in set(second.results["label"])]
+    if not both:
+        raise GibenchError(f"{first.root} and {second.root} have no method and setting in common")
+    _row("first", str(first.root))
+    _row("second", str(second.root))
+    _row("compared by", f"{name} of the {part} image, first less second")
+    _head("method")
+    for label in both:
+        _compared(label, first, label, second, label, name, part)
+    for label in both:
+        _times(first, label, second, label)
+
+
+def _one_label(results: Results, name: str) -> str:
+    labels = statistics.labels_of(results, name)
+    if len(labels) > 1:
+        raise GibenchError(
+            f"'{name}' has several settings in {results.root}: name one of {', '.join(labels)}"
+        )
+    return labels[0]
+
+
+def _head(what: str) -> None:
+    typer.echo(f"{what:<{LABEL}} {'difference':>10} {'95 % interval':>19}  verdict of the first")
+
+
+def _compared(text: str, first: Results, one: str, second: Results, other: str, name: str, part: str) -> None:
+    try:
+        difference = statistics.difference((first, one), (second, other), name, part)
+    except ResultsError as problem:  # one has failed, or has no such part
+        typer.echo(f"{_cut(text, LABEL):<{LABEL}} {_cut(f'not compared: {problem}', 79 - LABEL)}")
+        return
+    interval = difference.interval
+    typer.echo(
+        f"{_cut(text, LABEL):<{LABEL}} {interval.mean:+10.2g} {interval.low:+9.2g} {interval.high:+9.2g}  "
+        f"{difference.verdict}"
+    )
+
+
+def _times(first: Results, one: str, second: Results, other: str) -> None:
+    """Compare times where both were measured on the same machine, and say so where they were not."""
+    tables = [
+        results.results[(results.results["label"] == label) & (results.results["status"] == "ok")]
+        for results, label in ((first, one), (second, other))
+    ]
+    shared = sorted(set(tables[0]["machine"]) & set(tables[1]["machine"]))
+    name = one if one == other else "times"
+    if not shared:
+        typer.echo(f"{_cut(name, LABEL):<{LABEL}} times not compared: they are of different machines")
+    for machine in shared:
+        ms = [table[table["machine"] == machine]["ms_median"].mean() for table in tables]
+        prepare = [table[table["machine"] == machine]["prepare_s"].mean() for table in tables]
+        typer.echo(
+            f"{_cut(name, LABEL):<{LABEL}} {ms[0]:.1f} and {ms[1]:.1f} ms, prepared in "
+            f"{duration(prepare[0])} and {duration(prepare[1])}"
+        )
+
+
+def _cut(text: str, width: int) -> str:
+    return text if len(text) <= width else text[: width - 1] + "…"
+
+
+def _row(name: str, value: str) -> None:
+    typer.echo(f"{name:<14}{value}")

@@ -1,0 +1,73 @@
+"""What of the page can be told without a browser."""
+
+import json
+import re
+
+from gibench.benchmarks.report import write_report
+from gibench.benchmarks.report.page import page_data, write_page
+from gibench.benchmarks.report.summary import summarise
+from tests.benchmarks.report.synthetic import SyntheticRun
+
+
+def data_in(path):
+    text = path.read_text()
+    return json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.S)[1])
+
+
+def test_the_page_asks_nothing_of_a_network(page_file):
+    text = page_file.read_text()
+    assert not re.findall(r"""(?:src|href)=["'](?!#|data:,)(?![a-z]+\.csv)[^"']*""", text)
+    addresses = set(re.findall(r"https?://[^\s\"'<>)]+", text))
+    assert addresses <= {"http://www.w3.org/2000/svg"}  # the name of a namespace, never loaded
+    assert "@import" not in text
+    assert "fetch(" not in text
+
+
+def test_words_of_methods_and_tracebacks_cannot_end_the_script(run, tmp_path):
+    bad = SyntheticRun(run.root, scenes=1, frames=1, failed=("ulr",))
+    bad.results.loc[bad.results["label"] == "ulr", "reason"] = "</script><script>alert(1)</script><!--\u2028"
+    path = write_page(bad, summarise(bad), tmp_path)
+    reasons = [result["reason"] for result in data_in(path)["results"] if result["reason"]]
+    assert reasons == ["</script><script>alert(1)</script><!--\u2028"]
+    assert path.read_text().count("</script>") == 2
+
+
+def test_the_numbers_on_the_page_are_those_of_the_run(run, summary, page_file):
+    data = data_in(page_file)
+    by_id = {result["id"]: result for result in data["results"]}
+    for row in run.frames.itertuples():
+        scene = next(scene for scene in data["scenes"] if scene["id"] == run.of[row.result][1])
+        shown = by_id[row.result]["series"][f"{row.part}/{row.metric}"][scene["frames"].index(row.frame)]
+        assert abs(shown - row.value) <= 1e-3 * abs(row.value)
+    scores = summary.scores.set_index(["entry", "part", "metric"])
+    for entry, shown in enumerate(data["entries"]):
+        for name, (mean, low, high, *_) in shown["scores"].items():
+            row = scores.loc[(entry, *name.split("/"))]
+            for value, expected in ((mean, row["mean"]), (low, row["low"]), (high, row["high"])):
+                assert abs(value - expected) <= 1e-3 * abs(expected)
+
+
+def test_what_is_not_finite_is_no_number_on_the_page(run):
+    lost = SyntheticRun(run.root, scenes=1, frames=2)
+    lost.frames.loc[lost.frames["metric"] == "psnr", "value"] = float("inf")
+    data = page_data(lost, summarise(lost))
+    assert all(result["series"]["full/psnr"] == [None, None] for result in data["results"])
+    json.dumps(data, allow_nan=False)
+
+
+def test_a_run_that_failed_everywhere_still_has_a_page(run, tmp_path):
+    labels = tuple(setting.label for setting in run.settings)
+    lost = SyntheticRun(run.root, scenes=1, frames=1, failed=labels)
+    data = data_in(write_report(lost, tmp_path))
+    assert data["metrics"] == []
+    assert all("MemoryError" in result["reason"] for result in data["results"])
+
+
+def test_gaps_in_the_frames_are_gaps_in_the_series(run):
+    gaps = SyntheticRun(run.root, scenes=1, frames=3)
+    first = gaps.results["result"].iloc[0]
+    gaps.frames = gaps.frames[(gaps.frames["result"] != first) | (gaps.frames["frame"] != 1)]
+    data = page_data(gaps, summarise(gaps))
+    shown = next(result for result in data["results"] if result["id"] == first)["series"]["full/rmse"]
+    assert shown[1] is None
+    assert shown[0] is not None

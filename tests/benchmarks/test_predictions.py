@@ -1,0 +1,73 @@
+import numpy as np
+import pytest
+
+from gibench.baselines.method import Prediction
+from gibench.benchmarks import predictions
+from gibench.benchmarks.errors import ResultsError
+from gibench.benchmarks.predictions import BadPrediction, checked
+
+SIZE = (7, 5)
+
+
+def good(value: float = 0.5) -> np.ndarray:
+    return np.full((5, 7, 3), value, np.float32)
+
+
+def with_value(value: float) -> np.ndarray:
+    image = good()
+    image[2, 3, 1] = value
+    return image
+
+
+@pytest.mark.parametrize(
+    ("color", "says"),
+    [
+        (with_value(np.nan), "color is not finite in 1 of 35 pixels, first at row 2, column 3"),
+        (with_value(-np.inf), "not finite"),
+        (with_value(-1e-9), "color is negative in 1 of 35 pixels, first at row 2, column 3"),
+        (good()[:, :6], r"color has shape \(5, 6, 3\), asked for was \(5, 7, 3\)"),
+        (good()[..., 0], r"color has shape \(5, 7\)"),
+        (good().astype(int), "color is int64, asked for was float32"),
+        (np.full((5, 7, 3), 1e300), "above the largest of float32"),
+        (None, r"color has shape \(\)"),
+    ],
+)
+def test_what_is_no_image_is_refused(color, says):
+    with pytest.raises(BadPrediction, match=says):
+        checked(Prediction(color), SIZE)
+
+
+def test_the_specular_part_is_checked_too_and_may_be_missing():
+    with pytest.raises(BadPrediction, match="specular is negative"):
+        checked(Prediction(good(), with_value(-1)), SIZE)
+    assert set(checked(Prediction(good()), SIZE)) == {"full"}
+    with pytest.raises(BadPrediction, match="render returned NoneType"):
+        checked(None, SIZE)
+
+
+def test_zero_and_the_largest_value_are_radiance():
+    parts = checked(Prediction(good(0.0), good(3e38)), SIZE)
+    assert parts["full"].max() == 0
+    assert np.isfinite(parts["specular"]).all()
+
+
+def test_frames_come_back_as_they_were(tmp_path):
+    rng = np.random.default_rng(3)
+    parts = {
+        "full": np.exp(rng.uniform(-5, 5, (5, 7, 3))).astype(np.float32),
+        "specular": np.exp(rng.uniform(0, 14, (5, 7, 3))).astype(np.float32),  # beyond half
+    }
+    (tmp_path / "0000.exr").write_bytes(predictions.encode(parts))
+    back = predictions.read(tmp_path / "0000.exr")
+    assert list(back) == ["full", "specular"]
+    np.testing.assert_allclose(back["full"], parts["full"], rtol=1e-3, atol=1e-4)
+    np.testing.assert_array_equal(back["specular"], parts["specular"])
+    (tmp_path / "0001.exr").write_bytes(predictions.encode({"full": parts["full"]}))
+    assert list(predictions.read(tmp_path / "0001.exr")) == ["full"]
+
+
+def test_a_damaged_frame_is_named(tmp_path):
+    path = tmp_path / "0000.exr"
+    path.write_bytes(predictions.encode({"full": good()})[:200])
+    with pytest.raises(ResultsError, match=r"0000\.exr cannot be read .*run the same command again"):
+        predictions.read(path)

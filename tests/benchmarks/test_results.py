@@ -1,0 +1,130 @@
+import json
+
+import numpy as np
+import pytest
+
+from gibench.benchmarks.errors import ResultsError
+from gibench.benchmarks.result_files import RunFolder, canonical, key_of
+from gibench.benchmarks.results import COLUMNS, load
+
+FORMATS = [("gibench", "9.9.9"), ("format", 99)]
+
+
+def test_tables_are_tidy(results):
+    table = results.results
+    assert list(table.columns) == list(COLUMNS)
+    assert len(table) == 6
+    assert set(table["status"]) == {"ok"}
+    assert set(table["scene"]) == {"room-000000"}
+    assert table["result"].is_unique
+    assert (table["ms_p95"] >= table["ms_median"]).all()
+    assert (table["frames"] == 3).all()
+    assert json.loads(table.set_index("label").loc["plain shade=2", "knobs"]) == {"shade": 2.0}
+
+    frames = results.frames
+    assert list(frames.columns) == ["result", "frame", "ms", "metric", "part", "value"]
+    # Three metrics of three frames: of both parts for four results, of the full image for two.
+    assert len(frames) == 3 * 3 * (2 * 4 + 2)
+    assert not frames.duplicated(["result", "frame", "metric", "part"]).any()
+    assert frames["value"].notna().all()
+
+    assert set(results.sequences["metric"]) == {
+        f"temporal_difference{end}" for end in ("", "_prediction", "_reference")
+    }
+    assert list(results.floor.columns) == ["scene", "frame", "metric", "part", "value"]
+    assert set(results.floor["frame"]) == {-1, 0, 1, 2}
+    assert results.skipped == {}
+
+
+def test_times_are_those_of_the_frames(results):
+    merged = results.times.merge(results.results, on="result")
+    for _, group in merged.groupby("result"):
+        assert group["ms"].median() == pytest.approx(group["ms_median"].iloc[0])
+        assert np.percentile(group["ms"], 95) == pytest.approx(group["ms_p95"].iloc[0])
+    stages = results.stages
+    assert set(stages["stage"]) == {"gather", "other"}
+    for id in results.results["result"]:
+        own = stages[stages["result"] == id]
+        frames = results.record(id)["frames"]
+        assert "other" in set(own["stage"])
+        if len(own) == 2:
+            gather = [1000 * frame["stages"]["gather"] for frame in frames]
+            assert own.set_index("stage").loc["gather", "ms_median"] == pytest.approx(np.median(gather))
+
+
+def test_pixels_are_read_by_part(results):
+    label = results.results.set_index("label")["result"]
+    np.testing.assert_array_equal(results.prediction(label["constant shade=1"], 2, "specular"), 0.5)
+    with pytest.raises(ResultsError, match="has no part 'specular'"):
+        results.prediction(label["plain shade=2"], 2, "specular")
+    full, specular = (results.reference("room-000000", 1, part) for part in ("full", "specular"))
+    assert full.shape == specular.shape == (14, 20, 3)
+    assert (specular <= full * 1.01 + 1e-3).all()
+    with pytest.raises(ResultsError, match="has no scene 'room-9'; it has room-000000"):
+        results.reference("room-9", 0)
+
+
+def test_the_latest_code_stands(copy):
+    record = copy.read_result(copy.ids()[0])
+    config = {**record["config"], "code": {**record["config"]["code"], "sources": "edited"}}
+    key = key_of(config)
+    newer = {**record, "config": config, "key": key, "id": key[:16], "created": "2999-01-01T00:00:00+00:00"}
+    copy.result_file(key[:16]).write_text(json.dumps(newer))
+    again = load(copy.root)
+    assert len(again.results) == 6
+    assert again.superseded == 1
+    assert key[:16] in set(again.results["result"])
+    assert record["id"] not in set(again.results["result"])
+
+
+@pytest.mark.parametrize("content", ["", "{", "[]", "{}", "null", '{"format": 1}'])
+def test_a_cut_off_result_is_named_with_what_to_do(copy, content):
+    path = copy.result_file(copy.ids()[0])
+    path.write_text(content)
+    with pytest.raises(ResultsError, match=f"{path.name}.*(damaged|format).*(remove|run again)"):
+        load(copy.root)
+
+
+def test_a_result_that_was_changed_is_damaged(copy):
+    path = copy.result_file(copy.ids()[0])
+    record = json.loads(path.read_text())
+    record["config"]["knobs"]["shade"] = 7
+    path.write_text(json.dumps(record))
+    with pytest.raises(ResultsError, match="is damaged: it does not say what its name does"):
+        load(copy.root)
+
+
+@pytest.mark.parametrize("which", ["run.json", "result"])
+def test_another_version_is_refused_with_what_to_do(copy, which):
+    path = copy.run_file if which == "run.json" else copy.result_file(copy.ids()[0])
+    path.write_text(json.dumps({**json.loads(path.read_text()), "format": 99, "gibench": "9.9.9"}))
+    with pytest.raises(
+        ResultsError, match=r"is of format 99, this gibench .* reads format 1: read it with .* \(9\.9\.9\)"
+    ):
+        load(copy.root)
+
+
+def test_what_is_no_folder_of_results(tmp_path):
+    with pytest.raises(
+        ResultsError, match=r"holds no results: it has no run\.json; `gibench bench run` makes them"
+    ):
+        load(tmp_path)
+    (tmp_path / "run.json").write_text("{")
+    with pytest.raises(ResultsError, match=r"run\.json is damaged \(it is cut off or no JSON\)"):
+        load(tmp_path)
+
+
+def test_the_key_does_not_depend_on_how_a_configuration_is_written():
+    a = {"method": "é", "knobs": {"b": 1, "a": 0.1}}
+    b = {"knobs": {"a": 0.1, "b": 1}, "method": "é"}
+    assert canonical(a) == canonical(b)
+    assert key_of(a) == key_of(json.loads(json.dumps(a)))
+    assert key_of({**a, "knobs": {"b": 2, "a": 0.1}}) != key_of(a)
+
+
+def test_ids_leave_out_what_is_half_written(tmp_path):
+    folder = RunFolder(tmp_path)
+    folder.results.mkdir()
+    for name in ("0123.json", ".0123.json.partial-7", "notes.txt"):
+        (folder.results / name).touch()
+    assert folder.ids() == ["0123"]

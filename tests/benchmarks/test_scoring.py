@@ -1,0 +1,187 @@
+import json
+
+import numpy as np
+import pytest
+
+from gibench import metrics
+from gibench.benchmarks import scoring
+from gibench.benchmarks.errors import ResultsError
+from gibench.benchmarks.scenes import scenes_in
+from gibench.benchmarks.scoring import compute, half_parts, reference_parts, score
+
+SEQUENCE = ["warping_error", "temporal_difference", "mabd"]
+
+
+@pytest.fixture(scope="module")
+def scene(made):
+    (only,) = scenes_in(made[0] / "scenes/reference", made[0] / "scenes/reference-again")
+    return only
+
+
+def noisy(scene, amount: float = 0.2):
+    """A prediction that differs from pixel to pixel and from frame to frame."""
+
+    def frame_of(frame):
+        rng = np.random.default_rng(frame)
+        parts = reference_parts(scene, frame)
+        return {
+            part: (image * np.exp(amount * rng.standard_normal(image.shape))).astype(np.float32)
+            for part, image in parts.items()
+        }
+
+    return frame_of
+
+
+def stack(frames, part: str = "full") -> np.ndarray:
+    return np.stack([frames(frame)[part] for frame in range(3)])
+
+
+def test_frame_by_frame_is_what_the_metrics_say_of_the_whole_path(scene):
+    pred, exposure = noisy(scene), 0.7
+    new = compute(pred, scene, ["rmse", "dssim"], SEQUENCE, exposure)
+    reference = {part: stack(lambda f: reference_parts(scene, f), part) for part in ("full", "specular")}
+    for part, ref in reference.items():
+        row = metrics.evaluate(
+            stack(pred, part), ref, metrics=["rmse", "dssim"], exposure=np.full(3, exposure)
+        )
+        for name in ("rmse", "dssim"):
+            assert new["frames"][part][name] == pytest.approx(row[name].tolist(), rel=1e-12)
+        read = [scene.half(0, f, "motion", "motion_valid", "shape_id", "position") for f in range(3)]
+        motion = np.stack([r["motion"] for r in read])
+        visible = metrics.visibility(
+            motion, np.stack([r["shape_id"][..., 0] for r in read]), np.stack([r["position"] for r in read])
+        ) & np.stack([r["motion_valid"][..., 0] > 0 for r in read])
+        whole = metrics.evaluate_sequence(
+            stack(pred, part), ref, metrics=SEQUENCE, motion=motion, visible=visible, exposure=exposure
+        )
+        for name, value in whole.items():
+            if name != "exposure":
+                assert new["sequences"][part][name] == pytest.approx(value, rel=1e-12), name
+    assert visible.any()
+
+
+def test_the_reference_itself_has_no_error(scene):
+    new = compute(lambda f: reference_parts(scene, f), scene, ["rmse", "dssim"], ["temporal_difference"], 1.0)
+    for part in ("full", "specular"):
+        assert new["frames"][part] == {"rmse": [0, 0, 0], "dssim": [0, 0, 0]}
+        assert new["sequences"][part]["temporal_difference"] == 0
+
+
+def test_the_two_renderings_are_independent_and_agree_on_what_is_seen(scene):
+    for frame in range(3):
+        seen = ("position", "shape_id", "motion")
+        first, second = (scene.half(which, frame, "color", "color_se", *seen) for which in (0, 1))
+        for name in seen:
+            np.testing.assert_array_equal(first[name], second[name])
+        spread = np.sqrt(first["color_se"] ** 2 + second["color_se"] ** 2)
+        moved = ((first["color"] - second["color"]) / np.maximum(spread, 1e-20))[spread > 0]
+        assert len(moved) > 300
+        # Of the difference of two independent estimates, in units of its standard error.
+        assert moved.std() == pytest.approx(1, abs=0.2)
+
+
+def test_the_noise_floor_is_the_distance_of_one_rendering_to_the_mean(scene, results):
+    floor = results.floor
+    assert set(floor["part"]) == {"full", "specular"}
+    for part in ("full", "specular"):
+        halves = [half_parts(scene, which, 1)[part] for which in (0, 1)]
+        rows = floor[(floor["metric"] == "rmse") & (floor["frame"] == 1) & (floor["part"] == part)]
+        assert rows["value"].item() == pytest.approx(
+            0.5 * np.sqrt(np.mean((halves[0] - halves[1]) ** 2, dtype=np.float64)), rel=1e-5
+        )
+        assert rows["value"].item() > 0
+
+
+def test_all_frames_share_the_exposure_of_the_references(results, scene):
+    whole = stack(lambda f: reference_parts(scene, f))
+    assert results.exposure("room-000000") == metrics.reference_exposure(whole, shared=True)
+    label = results.results.set_index("label")["result"]
+    id = label["constant shade=1"]
+    frames = results.frames
+    for part, shade in (("full", 1.0), ("specular", 0.5)):
+        value = frames[
+            (frames["result"] == id)
+            & (frames["metric"] == "rmse_display")
+            & (frames["part"] == part)
+            & (frames["frame"] == 2)
+        ]["value"].item()
+        reference = reference_parts(scene, 2)[part]
+        shown = [
+            metrics.tone_map(image, results.exposure("room-000000"))
+            for image in (np.full_like(reference, shade), reference)
+        ]
+        assert value == pytest.approx(
+            np.sqrt(np.mean((shown[0] - shown[1]) ** 2, dtype=np.float64)), rel=1e-6
+        )
+
+
+def test_only_what_is_missing_is_computed(copy, monkeypatch):
+    asked = []
+    monkeypatch.setattr(scoring, "compute", lambda *a: asked.append(a[2:4]) or compute(*a))
+    monkeypatch.setattr(scoring, "default_threads", lambda workers: 1)
+    assert score(copy).done == 0
+    before = {path.name: json.loads(path.read_text()) for path in copy.scores.iterdir()}
+    assert score(copy, more=["relmse", "mabd"]).done == 7  # six results and the noise of one scene
+    assert asked == [(["relmse"], ["mabd"])] * 7
+    for path in copy.scores.iterdir():
+        now = json.loads(path.read_text())
+        for part, rows in before[path.name]["frames"].items():
+            assert {name: now["frames"][part][name] for name in rows} == rows
+            assert set(now["frames"][part]) - set(rows) == {"relmse"}
+    copy.score_file(copy.ids()[0]).unlink()
+    assert score(copy).done == 1
+
+
+def test_predictions_and_results_are_left_as_they_were(copy):
+    before = {path: path.read_bytes() for path in copy.results.rglob("*") if path.is_file()}
+    score(copy, more=["psnr"])
+    assert {path: path.read_bytes() for path in copy.results.rglob("*") if path.is_file()} == before
+
+
+def test_a_metric_that_cannot_be_computed_is_named_with_the_reason(copy, monkeypatch, tmp_path):
+    monkeypatch.setenv("GIBENCH_CACHE", str(tmp_path / "nothing"))
+    scored = score(copy, more=["lpips_alex"])
+    reason, count = scored.skipped["lpips_alex"]
+    assert count == 7
+    assert "gibench.metrics.lpips_weights" in reason or "not installed" in reason
+    assert score(copy, more=["lpips_alex"]).done == 0  # said once
+    assert "lpips_alex" in json.loads(copy.score_file(copy.ids()[0]).read_text())["skipped"]
+
+
+def test_images_that_are_too_small_are_such_a_reason():
+    reasons = scoring._impossible(np.zeros((8, 20, 3), np.float32), ["rmse", "dssim", "flip"])
+    assert list(reasons) == ["dssim"]
+    assert "needs at least 11×11" in reasons["dssim"]
+
+
+def test_an_unknown_metric(copy):
+    with pytest.raises(metrics.UnknownMetricError, match="no metric is named 'rmsee'"):
+        score(copy, more=["rmsee"])
+
+
+def test_a_damaged_prediction_and_a_damaged_result_are_named_and_the_rest_is_scored(copy):
+    first, second, *_ = copy.ids()
+    (copy.predictions(first) / "0001.exr").write_bytes(b"nothing")
+    copy.score_file(first).unlink()
+    copy.result_file(second).write_text("{")
+    copy.score_file(copy.ids()[3]).unlink()
+    scored = score(copy)
+    assert scored.done == 2
+    assert len(scored.problems) == 2
+    assert any("0001.exr cannot be read" in problem for problem in scored.problems)
+    assert any(f"{second}.json is damaged" in problem for problem in scored.problems)
+    assert copy.score_file(copy.ids()[3]).exists()
+
+
+def test_a_damaged_score_file_is_named(copy):
+    path = copy.score_file(copy.ids()[0])
+    path.write_text(path.read_text()[:50])
+    with pytest.raises(ResultsError, match=r"is damaged .*remove it and run `gibench bench score"):
+        score(copy)
+
+
+def test_what_json_lacks_is_none():
+    assert scoring._finite({"a": [1.0, float("nan"), float("inf")], "b": "x"}) == {
+        "a": [1.0, None, None],
+        "b": "x",
+    }

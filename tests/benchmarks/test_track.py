@@ -1,0 +1,95 @@
+import copy
+import math
+
+import pytest
+
+from gibench.benchmarks.errors import TrackError
+from gibench.benchmarks.track import SCORED, check_track, load_track, track_names
+from gibench.generators.rooms import sample_room
+from gibench.rendering.render import MAX_DEPTH
+from tests.benchmarks.conftest import TINY
+
+
+def changed(change) -> dict:
+    values = copy.deepcopy(TINY)
+    change(values, values["presets"]["tiny"])
+    return values
+
+
+def test_the_presets_of_the_walkthrough_are_what_the_issue_asks_for():
+    track = load_track("walkthrough")
+    assert track_names() == ("walkthrough",)
+    smoke, cpu, paper = (track.preset(name) for name in ("smoke", "cpu", "paper"))
+    assert smoke.rooms == 1
+    assert min(smoke.recipe("reference").resolution) >= 31  # what LPIPS needs
+    assert cpu.rooms >= 4
+    assert cpu.recipe("reference").resolution == (320, 180)
+    assert cpu.path_frames >= 24
+    assert paper.recipe("reference").resolution == (1920, 1080)
+    for preset in (smoke, cpu, paper):
+        training, reference = preset.recipe("training"), preset.recipe("reference")
+        assert training.views <= 20
+        assert reference.spp > training.spp
+        assert reference.denoise
+        again = preset.recipe("reference-again")
+        assert again.sample_seed != reference.sample_seed
+        assert again.model_copy(update={"sample_seed": reference.sample_seed}) == reference
+        assert set(SCORED) <= set(reference.channels)
+        # Methods trace as far as gibench does where it is not told; nothing may ask for more.
+        assert reference.max_depth == training.max_depth == MAX_DEPTH
+
+
+def test_training_views_and_references_are_of_the_same_rooms_and_no_frame_is_both():
+    preset = check_track(TINY).preset("tiny")
+    training, reference = preset.recipe("training"), preset.recipe("reference")
+    rooms = []
+    for recipe in (training, reference):
+        room = sample_room(
+            recipe.seed,
+            0,
+            kinds=recipe.kinds,
+            views=recipe.views,
+            path=recipe.path,
+            path_views=recipe.path_views,
+        )
+        rooms.append(room)
+    assert rooms[0].cameras == rooms[1].cameras
+    assert not set(training.rendered_views()) & set(reference.rendered_views())
+    assert {rooms[1].cameras[view].path for view in reference.rendered_views()} == {"walk"}
+    assert {rooms[0].cameras[view].path for view in training.rendered_views()} == {""}
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (lambda t, p: t.update(presetz={}), "track: presetz: Extra inputs"),
+        (lambda t, p: t.update(metrics=["rmsee"]), r"metrics: no metric 'rmsee'; did you mean 'rmse'"),
+        (lambda t, p: t.update(parts=["full", "diffuse"]), r"parts\.1"),
+        (lambda t, p: p.update(rooms=0), r"presets\.tiny\.rooms"),
+        (lambda t, p: p["budget"].update(render=-1), r"presets\.tiny\.budget\.render"),
+        (lambda t, p: p["budget"].update(render=math.nan), r"presets\.tiny\.budget\.render"),
+        (lambda t, p: p["room"].pop("path_views"), "preset tiny: room: path_views is missing"),
+        (lambda t, p: p["room"].update(path="stills"), "preset tiny: reference: path_views needs a path"),
+        (lambda t, p: p["room"].update(kinds=["barn"]), "preset tiny: reference: kinds: no kind 'barn'"),
+        (lambda t, p: p["training"].update(spq=3), "preset tiny: training: unknown key 'spq'"),
+        (
+            lambda t, p: p["reference"].update(channels=["radiance"]),
+            "preset tiny: reference: channels lacks position, shape_id, motion, motion_valid, which scoring needs",
+        ),
+    ],
+)
+def test_what_is_wrong_is_named_with_its_place(change, says):
+    with pytest.raises(TrackError, match=says):
+        check_track(changed(change))
+
+
+def test_unknown_tracks_presets_and_files(tmp_path):
+    with pytest.raises(TrackError, match=r"no track 'walktrough'; did you mean 'walkthrough'\?"):
+        load_track("walktrough")
+    with pytest.raises(TrackError, match=r"no preset 'cpus'; did you mean 'cpu'\?"):
+        load_track("walkthrough").preset("cpus")
+    with pytest.raises(TrackError, match=r"none\.toml cannot be read: No such file"):
+        load_track(str(tmp_path / "none.toml"))
+    (tmp_path / "bad.toml").write_text("id = ")
+    with pytest.raises(TrackError, match=r"bad\.toml is no valid TOML"):
+        load_track(str(tmp_path / "bad.toml"))
