@@ -175,7 +175,7 @@ def compare(
     within: Annotated[
         Path | None, typer.Option("--in", help="Compare two methods of this run.", show_default=False)
     ] = None,
-    metric: Annotated[str, typer.Option(help="Of two folders: the metric to compare by.")] = "rmse",
+    metric: Annotated[str, typer.Option(help="Of two folders: the metric to compare by.")] = "rmse_display",
     part: Annotated[str, typer.Option(help="Of two folders: full or specular.")] = "full",
 ) -> None:
     """Compare two runs, or two methods of one run, on the same frames."""

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-PLOTTED = ("rmse", "rmse_display", "dssim", "lpips_alex", "lpips_vgg", "flip")
+PLOTTED = ("rmse_display", "rmse", "dssim", "lpips_alex", "lpips_vgg", "flip")
 """Metrics that get plots of their own: those of the papers' tables and FLIP. The page draws any other."""
 
 WIDTH, HEIGHT = 6.5, 4.4
