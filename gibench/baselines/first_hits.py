@@ -42,14 +42,26 @@ def first_hits(
     grid: rays along each side of a pixel, at the centres of its cells; the reference averages over the pixel, so
     one ray at its centre costs edges dearly. Average with `pixels`. Needs a vectorised variant.
     """
-    width, height = resolution[0] * grid, resolution[1] * grid
-    generator = RayGenerator(camera, (width, height))
+    fine = (resolution[0] * grid, resolution[1] * grid)
+    return hits_of_rays(scene, RayGenerator(camera, fine), fine)
+
+
+def hits_of_rays(
+    scene: Scene, generator: RayGenerator, resolution: tuple[int, int], preliminary: Any = None
+) -> FirstHits:
+    """One ray through the centre of each cell of a generator's grid.
+
+    resolution: (width, height) of that grid. preliminary: what the rays hit, where an earlier kernel has found it: a
+    few numbers a ray, from which all others are computed anew for less than it takes to store them.
+    """
+    width, height = resolution
     lane = dr.arange(mi.UInt32, width * height)
     columns = dr.opaque(mi.UInt32, width)
     row = lane // columns
     centre = mi.Point2f(mi.Float(lane - row * columns) + 0.5, mi.Float(row) + 0.5)
     ray = generator.rays(centre)
-    preliminary = scene.mi_scene.ray_intersect_preliminary(ray, coherent=True)
+    if preliminary is None:
+        preliminary = scene.mi_scene.ray_intersect_preliminary(ray, coherent=True)
     si = preliminary.compute_surface_interaction(ray, mi.RayFlags.All)
     emission = si.emitter(scene.mi_scene).eval(si)
     active = si.is_valid()
@@ -58,7 +70,12 @@ def first_hits(
 
 def pixels(values: Any, hits: FirstHits, grid: int = 1) -> NDArray[np.float32]:
     """A mi.Color3f of the grid as an image (height, width, 3) float32, each pixel the mean of its grid × grid rays."""
-    width, height = hits.resolution
+    return averaged(values, hits.resolution, grid)
+
+
+def averaged(values: Any, resolution: tuple[int, int], grid: int = 1) -> NDArray[np.float32]:
+    """`pixels` of a grid of which only the resolution (width, height) is at hand."""
+    width, height = resolution
     image = np.array(mi.Color3f(values), dtype=np.float32).T.reshape(height, width, 3)
     if grid == 1:
         return image

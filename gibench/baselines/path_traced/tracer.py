@@ -1,0 +1,118 @@
+"""The real-time path tracer that the papers compare with: every light path, a few samples, then a denoiser.
+
+Rodriguez et al. 2020 ("Glossy Probe Reprojection for Interactive Global Illumination"), section 7.3.1: paths of all
+kinds in the same time as the method that is compared, which came to 2 a pixel, then OptiX's denoiser. Here it is Open
+Image Denoise with albedo and normal as guides.
+"""
+
+# mypy: disable-error-code="no-untyped-def, misc"
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from gibench.baselines.method import Prediction, Setting, Site, View
+from gibench.baselines.replay import Replay, camera_arrays, ray_generator
+from gibench.baselines.stages import Stages
+from gibench.rendering.denoise import denoise
+from gibench.rendering.integrator import trace_paths
+from gibench.rendering.render import MAX_DEPTH
+from gibench.rendering.sampling import IndependentSampler
+from gibench.rendering.scene import Scene
+
+LANES = 1 << 22
+"""Paths in flight at once, so that 32 samples of a large frame need no more memory than 2 of them."""
+
+IMAGES = ("emission", "diffuse", "specular", "albedo", "normal")
+
+
+def trace_rows(scene: Scene, camera, seed, first, width, pixels: int, spp: int) -> dict[str, Any]:
+    """IMAGES of rows of a frame, each mi.Color3f of `pixels` lanes. first: row. pixels, spp: how many."""
+    # Independent samples: strata make frames that are denoised no better, and each size of them is a kernel.
+    sampler = IndependentSampler()
+    sampler.independent.seed(seed, pixels * spp)
+    # Opaque, so that all numbers of samples share one kernel.
+    pixel = dr.arange(mi.UInt32, pixels * spp) // dr.opaque(mi.UInt32, spp)
+    row = pixel // width
+    corner = mi.Point2f(mi.Float(pixel - row * width), mi.Float(row + first))
+    path = trace_paths(
+        scene.mi_scene,
+        sampler,
+        ray_generator(camera).rays(corner + sampler.next_2d()),
+        max_depth=MAX_DEPTH,
+        guides=True,
+        portals=scene.portals,
+    )
+    values: dict[str, Any] = {
+        "emission": path.emission,
+        "diffuse": path.direct_diffuse + path.indirect_diffuse,
+        "specular": path.direct_specular + path.indirect_specular,
+        "albedo": path.albedo,
+        "normal": path.normal,
+    }
+    # A path that overflows counts as black. Shares are summed, so that huge radiance does not overflow on the way.
+    finite = dr.all(dr.isfinite(sum(values.values())))
+    share = dr.rcp(dr.opaque(mi.Float, spp))
+    values = {name: dr.select(finite, value * share, 0) for name, value in values.items()}
+    # One kernel for all of it. A reduction of what is not evaluated yet would trace the paths once more.
+    dr.eval(values)
+    sums = {name: mi.Color3f(*(dr.block_sum(c, spp) for c in value)) for name, value in values.items()}
+    dr.eval(sums)
+    return sums
+
+
+class PathTracer:
+    """Method `path-traced`; nothing is prepared."""
+
+    def __init__(self, settings: Mapping[str, Setting]) -> None:
+        """settings: spp, denoise."""
+        self.adjust(settings)
+
+    def adjust(self, settings: Mapping[str, Setting]) -> None:
+        """Take other settings from the next frame on."""
+        self._spp, self._denoise = int(settings["spp"]), bool(settings["denoise"])
+
+    def prepare(self, site: Site) -> None:
+        """Keep the scene."""
+        self._kernel = Replay(site.scene, partial(trace_rows, site.scene))
+
+    def render(self, view: View, stages: Stages) -> Prediction:
+        """Trace, then denoise the image as a whole, as a renderer shows it, and the specular part once more.
+
+        The sum of lobes denoised apart is worse below 8 paths a pixel: what one lacks is what the other has noise in.
+        """
+        with stages.stage("ray casting"):
+            images = self._traced(view)
+        specular = images["specular"]
+        color = images["emission"] + images["diffuse"] + specular
+        if self._denoise:
+            with stages.stage("denoising"):
+                guides = {"albedo": images["albedo"], "normal": images["normal"]}
+                color, specular = denoise(color, **guides), denoise(specular, **guides)
+        return Prediction(color, specular)
+
+    def _traced(self, view: View) -> dict[str, NDArray[np.float32]]:
+        """IMAGES as (H, W, 3) float32, means over the samples of a pixel."""
+        width, height = view.resolution
+        camera = camera_arrays(view.camera, view.resolution)
+        rows = max(LANES // (width * self._spp), 1)
+        parts = []
+        for first in range(0, height, rows):
+            count = min(rows, height - first)
+            seed = int(np.random.SeedSequence(view.seed, spawn_key=(first,)).generate_state(1)[0])
+            # Numbers that are not opaque are part of the recording.
+            varying = [dr.opaque(mi.UInt32, number) for number in (seed, first, width)]
+            images = self._kernel(camera, *varying, count * width, self._spp)
+            parts.append(
+                {
+                    name: np.array(image, dtype=np.float32).T.reshape(count, width, 3)
+                    for name, image in images.items()
+                }
+            )
+        return {name: np.concatenate([part[name] for part in parts]) for name in IMAGES}

@@ -1,0 +1,280 @@
+"""What the probes see, rendered into their maps.
+
+Four bakes, so that a method pays for what it reads: where the probes stand, the glossy radiance, the visible surface
+and the reflected one (Rodriguez et al. 2020, section 4.1). All probes share the passes: a lane is a path through a
+texel of any probe.
+"""
+
+# mypy: disable-error-code="no-untyped-def, misc"
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from gibench.baselines.method import Setting, Site
+from gibench.baselines.probes import placement
+from gibench.baselines.probes.errors import ProbeError
+from gibench.baselines.probes.mappings import MAPPINGS
+from gibench.baselines.replay import Replay
+from gibench.datasets.exr import fits_half
+from gibench.rendering import surface
+from gibench.rendering.denoise import denoise
+from gibench.rendering.gbuffer import _Hit as Hit
+from gibench.rendering.integrator import scatter_paths
+from gibench.rendering.render import MAX_DEPTH
+from gibench.rendering.sampling import IndependentSampler
+from gibench.rendering.scene import Scene
+
+VERSION = 1
+"""Of this code: maps with other values are another bake."""
+
+LANES = 1 << 22
+"""Paths in flight at once, so that memory does not grow with the probes."""
+
+SEED = 0
+"""Probes are part of the scene to all methods and seeds."""
+
+POSITIONS, RADIANCE, VISIBLE, REFLECTED = "positions", "radiance", "visible", "reflected"
+
+MAPS: dict[str, tuple[str, int, type]] = {
+    "radiance": (RADIANCE, 3, np.float16),
+    "distance": (VISIBLE, 1, np.float32),
+    "normal": (VISIBLE, 3, np.float16),
+    "roughness": (VISIBLE, 1, np.float16),
+    "material_id": (VISIBLE, 1, np.uint16),
+    "reflected_position": (REFLECTED, 3, np.float32),
+    "reflected_material_id": (REFLECTED, 1, np.uint16),
+}
+"""Map → the bake it lies in, components and type on disk. The radiance becomes float32 where half cannot hold it."""
+
+MARGIN = 32
+"""Columns from the other end of a map that its denoiser sees at either end."""
+
+
+@dataclass(frozen=True)
+class ProbeSettings:
+    """What decides the probes of a scene.
+
+    count: about how many (≥ 1). width: texels around (even). height: from top to bottom. spp: paths a texel.
+    denoise: whether radiance goes through Open Image Denoise. mapping: a name in `MAPPINGS`.
+    """
+
+    count: int
+    width: int
+    height: int
+    spp: int
+    denoise: bool = False
+    mapping: str = "lat-long"
+
+    def __post_init__(self) -> None:
+        """Raises ProbeError."""
+        if self.mapping not in MAPPINGS:
+            raise ProbeError(f"there is no mapping '{self.mapping}': choose from {', '.join(MAPPINGS)}")
+        if self.width < 2 or self.width % 2 or self.height < 2 or self.height % 2:
+            raise ProbeError(f"maps of {self.width} × {self.height} texels: both must be even and at least 2")
+        if self.count < 1 or not 1 <= self.spp <= LANES:
+            raise ProbeError(f"{self.count} probes of {self.spp} paths a texel: at least 1 of each is needed")
+
+    @staticmethod
+    def of(settings: Mapping[str, Setting]) -> ProbeSettings:
+        """From a method's settings with the knobs of `knobs.PROBE_KNOBS`."""
+        width = int(settings["probe_width"])
+        return ProbeSettings(
+            int(settings["probes"]),
+            width,
+            width // 2,
+            int(settings["probe_spp"]),
+            bool(settings["probe_denoise"]),
+        )
+
+
+def _rays(positions, mapping, lane, inside: Any):
+    """Rays of lanes that count texels, all of a probe after all of another. inside: mi.Point2f, place in the texel."""
+    texels = dr.opaque(mi.UInt32, mapping.width * mapping.height)
+    width = dr.opaque(mi.UInt32, mapping.width)
+    probe = lane // texels
+    texel = lane - probe * texels
+    row = texel // width
+    corner = mi.Point2f(mi.Float(texel - row * width), mi.Float(row))
+    return mi.Ray3f(dr.gather(mi.Point3f, positions, probe), mapping.direction(corner + inside))
+
+
+class _Baker:
+    """Fills maps of all probes, pass by pass."""
+
+    def __init__(self, scene: Scene, positions: NDArray[np.float32], settings: ProbeSettings) -> None:
+        """positions: (N, 3), metres."""
+        self.scene, self.settings, self.count = scene, settings, len(positions)
+        self.mapping = MAPPINGS[settings.mapping](settings.width, settings.height)
+        self.positions = mi.Float(positions.ravel())
+        dr.make_opaque(self.positions)
+
+    def run(
+        self, kernel: Callable[..., dict[str, Any]], samples: int, files: Mapping[str, NDArray[Any]]
+    ) -> None:
+        """Fill arrays (probes, height, width, components) by name from a kernel(first, seed, texels), pass by pass."""
+        replay = Replay(self.scene, kernel, self.positions)
+        flat = {name: array.reshape(-1, array.shape[-1]) for name, array in files.items()}
+        total = len(next(iter(flat.values())))
+        most = max(LANES // samples, 1)
+        for number, first in enumerate(range(0, total, most)):
+            count = min(most, total - first)
+            seed = int(np.random.SeedSequence(SEED, spawn_key=(number,)).generate_state(1)[0])
+            values = replay(dr.opaque(mi.UInt32, first), dr.opaque(mi.UInt32, seed), count)
+            for name, value in values.items():
+                parts = (
+                    [np.array(part) for part in value]
+                    if isinstance(value, (list, tuple))
+                    else [np.array(value)]
+                )
+                flat[name][first : first + count] = np.stack(parts, axis=-1)
+
+    def radiance(self, first, seed, texels: int) -> dict[str, Any]:
+        spp = self.settings.spp
+        sampler = IndependentSampler()
+        sampler.independent.seed(seed, texels * spp)
+        share = dr.rcp(dr.opaque(mi.Float, spp))
+        lane = dr.arange(mi.UInt32, texels * spp) // dr.opaque(mi.UInt32, spp) + first
+        ray = _rays(self.positions, self.mapping, lane, sampler.next_2d())
+        si = self.scene.mi_scene.ray_intersect(ray)
+        path = scatter_paths(
+            self.scene.mi_scene,
+            sampler,
+            si,
+            si.bsdf(ray),
+            mi.Bool(True),
+            max_depth=MAX_DEPTH,
+            lobes="specular",
+            portals=self.scene.portals,
+        )
+        value = path.direct_specular + path.indirect_specular
+        value = dr.select(dr.all(dr.isfinite(value)), value * share, 0)
+        dr.eval(value)
+        sums = [dr.block_sum(part, spp) for part in value]
+        dr.eval(sums)
+        return {"radiance": sums}
+
+    def surfaces(self, names: tuple[str, ...]) -> Callable[..., dict[str, Any]]:
+        """A kernel that samples these maps, and `specular_albedo`, at the centres of texels."""
+
+        def kernel(first, seed, texels: int) -> dict[str, Any]:
+            lane = dr.arange(mi.UInt32, texels) + first
+            ray = _rays(self.positions, self.mapping, lane, mi.Point2f(0.5))
+            hit = Hit(self.scene, ray, mi.RayFlags.All)
+            mirror = hit.mirrored() if any(name.startswith("reflected") for name in names) else hit
+            values: dict[str, Callable[[], Any]] = {
+                "distance": lambda: hit.masked(hit.si.t),
+                "normal": lambda: list(hit.normal),
+                "roughness": lambda: surface.roughness(hit.bsdf, hit.si, hit.valid),
+                "material_id": lambda: self.scene.material_ids(hit.bsdf, hit.valid),
+                "specular_albedo": lambda: list(surface.specular_albedo(hit.bsdf, hit.si, hit.valid)),
+                "reflected_position": lambda: list(mirror.masked(mirror.si.p)),
+                "reflected_material_id": lambda: self.scene.material_ids(mirror.bsdf, mirror.valid),
+            }
+            computed = {name: values[name]() for name in names}
+            dr.eval(computed)
+            return computed
+
+        return kernel
+
+
+def _new(folder: Path, name: str, shape: tuple[int, ...], dtype: type) -> NDArray[Any]:
+    """A file of zeros that an array lies in, so that maps need not fit into memory."""
+    path = folder / f"{name}.npy"
+    array: NDArray[Any] = np.lib.format.open_memmap(path, mode="w+", dtype=dtype, shape=shape)
+    return array
+
+
+def _bake_surfaces(baker: _Baker, part: str, folder: Path) -> None:
+    settings = baker.settings
+    shape = (baker.count, settings.height, settings.width)
+    chosen = {name: (size, dtype) for name, (where, size, dtype) in MAPS.items() if where == part}
+    files = {name: _new(folder, name, (*shape, size), dtype) for name, (size, dtype) in chosen.items()}
+    baker.run(baker.surfaces(tuple(files)), 1, files)
+    for file in files.values():
+        file.flush()  # type: ignore[attr-defined]
+
+
+def _denoised(
+    radiance: NDArray[np.float32], guides: Mapping[str, NDArray[np.float32]]
+) -> NDArray[np.float32]:
+    """One map (H, W, 3), denoised as if it went on beyond its left and right edge."""
+    margin = min(MARGIN, radiance.shape[1])
+
+    def around(image: NDArray[np.float32]) -> NDArray[np.float32]:
+        return np.concatenate([image[:, -margin:], image, image[:, :margin]], axis=1)
+
+    return denoise(around(radiance), **{name: around(guide) for name, guide in guides.items()})[
+        :, margin:-margin
+    ]
+
+
+def _bake_radiance(baker: _Baker, folder: Path) -> None:
+    settings = baker.settings
+    shape = (baker.count, settings.height, settings.width, 3)
+    raw = _new(folder, "raw", shape, np.float32)
+    baker.run(baker.radiance, settings.spp, {"radiance": raw})
+    if settings.denoise:
+        guides = {
+            "normal": np.zeros(shape, dtype=np.float32),
+            "specular_albedo": np.zeros(shape, dtype=np.float32),
+        }
+        baker.run(baker.surfaces(tuple(guides)), 1, guides)
+        albedo, normal = np.clip(guides["specular_albedo"], 0, 1), guides["normal"]
+        for k in range(len(raw)):
+            raw[k] = _denoised(np.asarray(raw[k]), {"albedo": albedo[k], "normal": normal[k]})
+    # Radiance is compared with the mean of its map: what is far below it may lose digits.
+    half = all(fits_half(np.asarray(one), dark=float(one.mean())) for one in raw)
+    final = _new(folder, "radiance", shape, np.float16 if half else np.float32)
+    for k in range(len(raw)):
+        final[k] = raw[k]
+    final.flush()  # type: ignore[attr-defined]
+    del raw
+    (folder / "raw.npy").unlink()
+
+
+def baked_files(site: Site, settings: ProbeSettings, maps: tuple[str, ...]) -> dict[str, Path]:
+    """Files by name of map, and "positions", baked where they are not there yet.
+
+    maps: names in MAPS. Raises ProbeError, DenoiserError.
+    """
+    placed = {
+        "version": VERSION,
+        "placement": placement.VERSION,
+        "part": POSITIONS,
+        "probes": settings.count,
+    }
+
+    def make_positions(folder: Path) -> None:
+        np.save(folder / "positions.npy", placement.place(site.scene, settings.count))
+
+    where = site.bakes.get("probes", placed, make_positions).folder / "positions.npy"
+    files = {POSITIONS: where}
+    for part in dict.fromkeys(MAPS[name][0] for name in maps):
+        chosen: dict[str, Any] = {
+            **placed,
+            "part": part,
+            "mapping": settings.mapping,
+            "width": settings.width,
+            "height": settings.height,
+        }
+        if part == RADIANCE:
+            chosen |= {"spp": settings.spp, "denoise": settings.denoise, "max_depth": MAX_DEPTH}
+
+        def make(folder: Path, part: str = part) -> None:
+            baker = _Baker(site.scene, np.load(where), settings)
+            if part == RADIANCE:
+                _bake_radiance(baker, folder)
+            else:
+                _bake_surfaces(baker, part, folder)
+
+        folder = site.bakes.get("probes", chosen, make).folder
+        files |= {name: folder / f"{name}.npy" for name in maps if MAPS[name][0] == part}
+    return files

@@ -1,0 +1,75 @@
+"""Paths that follow the glossy lobe alone and end on the lightmap."""
+
+# mypy: disable-error-code="no-untyped-def, misc"
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+
+from gibench.baselines.lightmap.lookup import Lightmap
+
+
+def _weight(pdf_a, pdf_b):
+    """Power heuristic with exponent 2 (Veach 1997, section 9.2.4), as a ratio, since squares near a mirror overflow."""
+    return dr.select(pdf_a > 0, dr.rcp(1 + dr.square(pdf_b / dr.maximum(pdf_a, 1e-30))), 0)
+
+
+def _scatter(scene, context, sampler, si, bsdf, active):
+    """One light sample and one sample of the lobes in `context` at a hit.
+
+    Returns what the light sample adds, the next ray, its weight, density, and whether it is a mirror's.
+    """
+    lit = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
+    light, radiance = scene.sample_emitter_direction(si, sampler.next_2d(), True, lit)
+    lit &= light.pdf != 0
+    value, value_pdf, bounce, weight = bsdf.eval_pdf_sample(
+        context, si, si.to_local(light.d), sampler.next_1d(), sampler.next_2d(), active
+    )
+    share = dr.select(light.delta, 1, _weight(light.pdf, value_pdf))
+    seen = dr.select(lit, value * radiance * share, 0)
+    delta = mi.has_flag(bounce.sampled_type, mi.BSDFFlags.Delta)
+    return seen, si.spawn_ray(si.to_world(bounce.wo)), weight, bounce.pdf, delta
+
+
+@dr.syntax
+def glossy_radiance(scene, lightmap: Lightmap, sampler, si, bsdf, active, samples, bounces):
+    """What hits reflect towards si.wi by their glossy lobe, mi.Color3f, the mean of `samples` paths.
+
+    scene: mitsuba.Scene. sampler: mi.Sampler with a lane a hit. samples, bounces: mi.UInt32, opaque. At every hit of a
+    path there is what it emits, which next-event estimation at the hit before shares, and its diffuse light from the
+    lightmap; then, up to `bounces` glossy reflections, its glossy lobe. Exactly 0 where there is no such lobe.
+    """
+    others = int(mi.BSDFFlags.All) & ~int(mi.BSDFFlags.DiffuseReflection)
+    context = mi.BSDFContext(mi.TransportMode.Radiance, others)
+    glossy = active & ((bsdf.flags() & others) != 0)
+    total = mi.Spectrum(0)
+    done = mi.UInt32(0)
+
+    while glossy & (done < samples):
+        seen, ray, throughput, pdf, delta = _scatter(scene, context, sampler, si, bsdf, glossy)
+        total += dr.select(dr.all(dr.isfinite(seen)), seen, 0)
+        reference = mi.Interaction3f(si)
+        bounce = mi.UInt32(1)
+        alive = glossy & (dr.max(throughput) > 0)
+
+        while alive:
+            preliminary = scene.ray_intersect_preliminary(ray, coherent=False, active=alive)
+            hit = preliminary.compute_surface_interaction(ray, mi.RayFlags.All, alive)
+            emitter = hit.emitter(scene)
+            towards = mi.DirectionSample3f(scene, hit, reference)
+            light_pdf = scene.pdf_emitter_direction(reference, towards, alive & (delta ^ True))
+            emitted = emitter.eval(hit, alive) * _weight(pdf, light_pdf)
+            gained = throughput * (emitted + lightmap.diffuse(hit, preliminary, alive))
+
+            there = hit.bsdf(ray)
+            alive &= hit.is_valid() & (bounce < bounces) & ((there.flags() & others) != 0)
+            seen, ray, weight, pdf, delta = _scatter(scene, context, sampler, hit, there, alive)
+            gained += throughput * seen
+            total += dr.select(dr.all(dr.isfinite(gained)), gained, 0)
+            throughput *= weight
+            reference = mi.Interaction3f(hit)
+            bounce += 1
+            alive &= dr.max(throughput) > 0
+        done += 1
+
+    return total / mi.Float(dr.maximum(samples, 1))
