@@ -151,6 +151,28 @@ def _prepare(variant: str) -> str | None:
     return None
 
 
+@cache
+def _refuse_old_llvm() -> None:
+    """Raises BackendError where Dr.Jit has loaded an LLVM that aborts the process at the first kernel.
+
+    So it does when a variant is set by `mitsuba.set_variant` before `select_variant` could point at a better one.
+    """
+    maps = Path("/proc/self/maps")
+    if not maps.exists():
+        return
+    old = None
+    for path in set(re.findall(r"/\S*libLLVM\S*", maps.read_text(encoding="utf-8", errors="replace"))):
+        in_name = re.search(r"(\d+(?:\.\d+)*)", Path(path).name)
+        if LLVM_VARIABLE in os.environ or in_name is None or _major(in_name.group(1)) >= MINIMUM_LLVM:
+            return  # an old one beside it belongs to the graphics driver
+        old = path
+    if old is not None:
+        raise BackendError(
+            f"a variant was set before gibench and loaded {old}, which is older than LLVM {MINIMUM_LLVM} and aborts at "
+            "the first kernel: call gibench.rendering.backend.select_variant() instead of mitsuba.set_variant()"
+        )
+
+
 def select_variant(name: str = "auto") -> str:
     """Makes a Mitsuba variant current and returns its name.
 
@@ -164,6 +186,8 @@ def select_variant(name: str = "auto") -> str:
     loaded = sys.modules.get("mitsuba")
     current = loaded.variant() if loaded is not None else None
     if current in VARIANTS and name in ("auto", current):
+        if str(current).startswith("llvm"):
+            _refuse_old_llvm()
         return str(current)
 
     reasons: list[str] = []

@@ -107,3 +107,17 @@ def test_describe_says_what_there_is():
     assert found["variant"] in backend.VARIANTS
     assert found["denoiser"] == found["versions"]["mitsuba-oidn"]
     assert json.loads(json.dumps(found)) == found
+
+
+def test_an_old_llvm_that_mitsuba_loaded_first_is_named_before_it_aborts():
+    """Whatever this machine has: the right answer, or an error that names the way out; never a signal."""
+    result = run(
+        "import mitsuba as mi; mi.set_variant('llvm_ad_rgb')\n"
+        "from gibench.rendering.backend import select_variant; select_variant()\n"
+        "import drjit as dr; print(dr.sum(dr.maximum(dr.arange(mi.Float, 10), 5))[0])"
+    )
+    if result.returncode == 0:
+        assert result.stdout.split() == ["60.0"]
+    else:
+        assert result.returncode == 1
+        assert "select_variant() instead of" in result.stderr or "LLVM" in result.stderr
