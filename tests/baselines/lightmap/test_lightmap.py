@@ -58,15 +58,16 @@ def test_agrees_with_the_path_tracer_in_a_furnished_room(tmp_path):
     options = {"resolution": (64, 48), "channels": ["radiance"], "spp": 256}
     truth = render_frame(scene, camera, **options).arrays
     wanted = truth["emission"] + truth["direct_diffuse"] + truth["indirect_diffuse"]
-    method = prepared(scene, tmp_path, texels=8, lightmap_spp=64, rays=16)
+    method = prepared(scene, tmp_path, texels=8, lightmap_spp=256, rays=16)
     found = method.render(view(camera, resolution=(64, 48)), Stages()).color
     bright = np.minimum(np.stack([found, wanted]), 5 * np.median(wanted))
     blocks = bright.reshape(2, 6, 8, 8, 8, 3).mean(axis=(2, 4, 5))
     bias = blocks[0].mean() / blocks[1].mean() - 1
     error = np.sqrt(np.mean((blocks[0] - blocks[1]) ** 2)) / blocks[1].mean()
     print(f"bias {bias:.3f}, relative error of blocks {error:.3f}")
+    # Over seeds of the bake the bias spreads by some 1.5 %: much of the light is a desk lamp's.
     assert abs(bias) < 0.04
-    assert error < 0.12
+    assert error < 0.1
 
 
 def test_finer_rays_serve_the_same_bake(tmp_path):
