@@ -52,7 +52,7 @@ def _inverse(x):
     return dr.rcp(dr.maximum(x, SMALLEST))
 
 
-def _mis_weight(pdf_a, pdf_b):
+def mis_weight(pdf_a, pdf_b):
     """Power heuristic for a sample drawn with `pdf_a`; 0 where it could not be drawn.
 
     As a ratio, since the squares of densities near a mirror's overflow.
@@ -61,7 +61,8 @@ def _mis_weight(pdf_a, pdf_b):
 
 
 _DIFFUSE = mi.BSDFFlags.DiffuseReflection
-_OTHER = int(mi.BSDFFlags.All) & ~int(_DIFFUSE)
+NOT_DIFFUSE = int(mi.BSDFFlags.All) & ~int(_DIFFUSE)
+"""Mask of all lobes that count as specular."""
 
 
 def _split(bsdf, value, diffuse):
@@ -69,7 +70,7 @@ def _split(bsdf, value, diffuse):
 
     A difference leaves dust of rounding, so what does not exist is set to 0.
     """
-    other = dr.select((bsdf.flags() & _OTHER) != 0, dr.maximum(value - diffuse, 0), 0)
+    other = dr.select((bsdf.flags() & NOT_DIFFUSE) != 0, dr.maximum(value - diffuse, 0), 0)
     return diffuse, other
 
 
@@ -100,7 +101,7 @@ def _emission_weight(scene, portals, si, reference, pdf, delta, active):
     if portals is not None:
         by_portal = dr.select(emitter == portals.environment, portals.density(reference.p, towards.d), 0)
         light_pdf = dr.lerp(light_pdf, by_portal, portals.share)
-    return _mis_weight(pdf, light_pdf)
+    return mis_weight(pdf, light_pdf)
 
 
 def _sample_light(scene, portals, si, u, active):
@@ -178,7 +179,7 @@ def _indirect(scene, portals, sampler, ray, reference, pdf, delta, weight, eta, 
             context, si, to_light, sampler.next_1d(), sampler.next_2d(), active
         )
         value = si.to_world_mueller(value, -to_light, si.wi)
-        share = dr.select(only_so, 1, _mis_weight(light_pdf, value_pdf))
+        share = dr.select(only_so, 1, mis_weight(light_pdf, value_pdf))
         later += dr.select(lit, throughput * value * light * share, 0)
 
         # The next direction.
@@ -209,7 +210,7 @@ def scatter_paths(
     alone, with all samples, and leave the other at 0. portals: `Scene.portals`, for less noise by daylight. emission
     of the result is 0.
     """
-    mask = {"all": int(mi.BSDFFlags.All), "diffuse": int(_DIFFUSE), "specular": _OTHER}[lobes]
+    mask = {"all": int(mi.BSDFFlags.All), "diffuse": int(_DIFFUSE), "specular": NOT_DIFFUSE}[lobes]
     asked = mi.BSDFContext(mi.TransportMode.Radiance, mask)
     diffuse = mi.BSDFContext(mi.TransportMode.Radiance, int(_DIFFUSE))
     active = active & si.is_valid() & ((bsdf.flags() & mask) != 0) & (max_depth >= 1)
@@ -222,7 +223,7 @@ def scatter_paths(
     value, value_pdf, bounce, weight = bsdf.eval_pdf_sample(
         asked, si, to_light, sampler.next_1d(), sampler.next_2d(), active
     )
-    share = dr.select(only_so, 1, _mis_weight(light_pdf, value_pdf))
+    share = dr.select(only_so, 1, mis_weight(light_pdf, value_pdf))
     light = dr.select(lit, light * share, 0)
 
     delta = mi.has_flag(bounce.sampled_type, mi.BSDFFlags.Delta)

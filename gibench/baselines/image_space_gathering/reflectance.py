@@ -6,6 +6,8 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
+from gibench.rendering.integrator import NOT_DIFFUSE
+
 SAMPLES = 64
 """Of the lobe, a power of two. A few per cent of a rough lobe's half vectors reflect below the horizon, which fewer
 samples miss: 16 are 6 % too bright at GGX alpha 0.2, 64 are 2 %."""
@@ -13,8 +15,7 @@ samples miss: 16 are 6 % too bright at GGX alpha 0.2, 64 are 2 %."""
 
 def specular_context():
     """Evaluate everything but the diffuse lobe."""
-    others = int(mi.BSDFFlags.All) & ~int(mi.BSDFFlags.DiffuseReflection)
-    return mi.BSDFContext(mi.TransportMode.Radiance, others)
+    return mi.BSDFContext(mi.TransportMode.Radiance, NOT_DIFFUSE)
 
 
 @dr.syntax

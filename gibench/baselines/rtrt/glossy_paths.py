@@ -7,11 +7,7 @@ import drjit as dr
 import mitsuba as mi
 
 from gibench.baselines.lightmap.lookup import Lightmap
-
-
-def _weight(pdf_a, pdf_b):
-    """Power heuristic with exponent 2 (Veach 1997, section 9.2.4), as a ratio, since squares near a mirror overflow."""
-    return dr.select(pdf_a > 0, dr.rcp(1 + dr.square(pdf_b / dr.maximum(pdf_a, 1e-30))), 0)
+from gibench.rendering.integrator import NOT_DIFFUSE, mis_weight
 
 
 def _scatter(scene, context, sampler, si, bsdf, active):
@@ -25,7 +21,7 @@ def _scatter(scene, context, sampler, si, bsdf, active):
     value, value_pdf, bounce, weight = bsdf.eval_pdf_sample(
         context, si, si.to_local(light.d), sampler.next_1d(), sampler.next_2d(), active
     )
-    share = dr.select(light.delta, 1, _weight(light.pdf, value_pdf))
+    share = dr.select(light.delta, 1, mis_weight(light.pdf, value_pdf))
     seen = dr.select(lit, value * radiance * share, 0)
     delta = mi.has_flag(bounce.sampled_type, mi.BSDFFlags.Delta)
     return seen, si.spawn_ray(si.to_world(bounce.wo)), weight, bounce.pdf, delta
@@ -39,9 +35,8 @@ def glossy_radiance(scene, lightmap: Lightmap, sampler, si, bsdf, active, sample
     path there is what it emits, which next-event estimation at the hit before shares, and its diffuse light from the
     lightmap; then, up to `bounces` glossy reflections, its glossy lobe. Exactly 0 where there is no such lobe.
     """
-    others = int(mi.BSDFFlags.All) & ~int(mi.BSDFFlags.DiffuseReflection)
-    context = mi.BSDFContext(mi.TransportMode.Radiance, others)
-    glossy = active & ((bsdf.flags() & others) != 0)
+    context = mi.BSDFContext(mi.TransportMode.Radiance, NOT_DIFFUSE)
+    glossy = active & ((bsdf.flags() & NOT_DIFFUSE) != 0)
     total = mi.Spectrum(0)
     done = mi.UInt32(0)
 
@@ -58,11 +53,11 @@ def glossy_radiance(scene, lightmap: Lightmap, sampler, si, bsdf, active, sample
             emitter = hit.emitter(scene)
             towards = mi.DirectionSample3f(scene, hit, reference)
             light_pdf = scene.pdf_emitter_direction(reference, towards, alive & (delta ^ True))
-            emitted = emitter.eval(hit, alive) * _weight(pdf, light_pdf)
+            emitted = emitter.eval(hit, alive) * mis_weight(pdf, light_pdf)
             gained = throughput * (emitted + lightmap.diffuse(hit, preliminary, alive))
 
             there = hit.bsdf(ray)
-            alive &= hit.is_valid() & (bounce < bounces) & ((there.flags() & others) != 0)
+            alive &= hit.is_valid() & (bounce < bounces) & ((there.flags() & NOT_DIFFUSE) != 0)
             seen, ray, weight, pdf, delta = _scatter(scene, context, sampler, hit, there, alive)
             gained += throughput * seen
             total += dr.select(dr.all(dr.isfinite(gained)), gained, 0)
