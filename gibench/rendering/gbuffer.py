@@ -30,6 +30,17 @@ UMBILIC_TOLERANCE = 1e-4
 SURFACE_SETS = ("surface", "reflection", "curvature", "motion")
 
 
+def mirror_direction(si: Any, towards: Any) -> Any:
+    """Unit mi.Vector3f that a ray of direction `towards` takes from a hit `si` if the surface is a mirror.
+
+    It stays on the side of the surface that the ray comes from.
+    """
+    shading, face = (towards - 2 * dr.dot(towards, n) * n for n in (si.sh_frame.n, si.n))
+    # Interpolated normals can send it through the surface near a silhouette: there the face decides.
+    leaves = dr.dot(shading, si.n) * dr.dot(towards, si.n) < 0
+    return dr.normalize(dr.select(leaves, shading, face))
+
+
 class _Hit:
     """The first hit of each pixel, with what several channels share."""
 
@@ -51,12 +62,7 @@ class _Hit:
 
     def mirrored(self) -> _Hit:
         """The hit of the mirror ray."""
-        si, d = self.si, self.rays.d
-        face = self.facing(si.n)
-        mirror = d - 2 * dr.dot(d, self.normal) * self.normal
-        # Interpolated normals can send it through the surface near a silhouette: there the face decides.
-        mirror = dr.select(dr.dot(mirror, face) > 0, mirror, d - 2 * dr.dot(d, face) * face)
-        rays = si.spawn_ray(dr.normalize(mirror))
+        rays = self.si.spawn_ray(mirror_direction(self.si, self.rays.d))
         rays.maxt = dr.select(self.valid, rays.maxt, 0)
         return _Hit(self.scene, rays, mi.RayFlags.All)
 

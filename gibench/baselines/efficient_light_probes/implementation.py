@@ -1,0 +1,103 @@
+"""The method `elp-search`: diffuse light from the lightmap, glossy light from probes that are searched."""
+
+# mypy: disable-error-code="no-untyped-def, misc"
+from __future__ import annotations
+
+from functools import partial
+from typing import Any, ClassVar
+
+import drjit as dr
+import mitsuba as mi
+
+from gibench.baselines.efficient_light_probes.search import Reflected, Screen, blended
+from gibench.baselines.first_hits import averaged, hits_of_rays
+from gibench.baselines.lightmap.deferred import OnLightmap
+from gibench.baselines.method import Prediction, Site, View
+from gibench.baselines.probes.baking import ProbeSettings
+from gibench.baselines.probes.maps import Probes, load_probes
+from gibench.baselines.replay import Replay, camera_arrays, ray_generator
+from gibench.baselines.stages import Stages
+from gibench.rendering.gbuffer import mirror_direction
+from gibench.rendering.integrator import NOT_DIFFUSE
+
+MAPS = ("radiance", "material_id", "reflected_position", "reflected_material_id")
+
+
+def _gbuffer(scene, lightmap, camera, width: int, height: int):
+    """What was hit, the light it sends out but for glossy light, and what a search walks over."""
+    hits = hits_of_rays(scene, ray_generator(camera), (width, height))
+    seen = hits.emission + lightmap.diffuse(hits.si, hits.preliminary, hits.active)
+    surfaces = {
+        "glossy": hits.active & ((hits.bsdf.flags() & NOT_DIFFUSE) != 0),
+        "position": dr.select(hits.active, mi.Point3f(hits.si.p), 0),
+        "normal": dr.select(hits.active, mi.Vector3f(dr.mulsign(hits.si.sh_frame.n, hits.si.wi.z)), 0),
+        "material": scene.material_ids(hits.bsdf, hits.active),
+    }
+    dr.eval(hits.preliminary, seen, surfaces)
+    return hits.preliminary, seen, surfaces
+
+
+def _mirrored(scene, _lightmap, camera, preliminary, glossy, width: int, height: int):
+    """What each glossy hit would reflect if it were a mirror: the point, or the direction where that is nothing."""
+    hits = hits_of_rays(scene, ray_generator(camera), (width, height), preliminary)
+    ray = hits.si.spawn_ray(mirror_direction(hits.si, hits.ray.d))
+    found = scene.mi_scene.ray_intersect_preliminary(ray, coherent=False, active=glossy)
+    far = ~found.is_valid()
+    target = dr.select(far, mi.Point3f(ray.d), ray(dr.select(far, 0, found.t)))
+    dr.eval(target, far)
+    return target, far
+
+
+def _searched(probes: Probes, camera, surfaces, target, far, size, count: int, steps, tolerance):
+    """Glossy light at each camera ray, and the steps of its searches. count: of probes that are searched."""
+    candidates = dr.concat(probes.nearest(camera["_origin"], count))
+    dr.eval(candidates)  # found once a frame, not once a point
+    screen = Screen(surfaces["position"], surfaces["normal"], surfaces["material"], camera, *size)
+    glossy = surfaces["glossy"]
+    number = dr.opaque(mi.UInt32, count)
+    found = blended(probes, candidates, number, screen, Reflected(target, far), steps, tolerance, glossy)
+    color, made = (dr.select(glossy, value, 0) for value in found)
+    dr.eval(color, made)
+    return color, made
+
+
+class ReflectionSearch(OnLightmap):
+    """See `gibench.baselines.efficient_light_probes.SEARCH`."""
+
+    functions: ClassVar = {"g-buffer": _gbuffer, "mirror": _mirrored}
+
+    def prepare(self, site: Site) -> None:
+        """Bake the lightmap and the probes, or find them."""
+        super().prepare(site)
+        probes = load_probes(site, ProbeSettings.of(self.settings), MAPS)
+        self.probes = probes.count
+        self.kernels["search"] = Replay(site.scene, partial(_searched, probes), probes.arrays)
+
+    def render(self, view: View, stages: Stages) -> Prediction:
+        """First hits, what they mirror, and the light of the probes where those mirror the same."""
+        grid, fine = self.grid, self.fine(view)
+        camera = camera_arrays(view.camera, fine)
+        with stages.stage("g-buffer"):
+            preliminary, seen, surfaces = self.kernels["g-buffer"](camera, *fine)
+            base = averaged(seen, fine, grid)
+        with stages.stage("ray casting"):
+            target, far = self.kernels["mirror"](camera, preliminary, surfaces["glossy"], *fine)
+        with stages.stage("search"):
+            color, made = self.kernels["search"](
+                camera,
+                surfaces,
+                target,
+                far,
+                [dr.opaque(mi.Int32, side) for side in fine],
+                min(int(self.settings["candidates"]), self.probes),
+                dr.opaque(mi.UInt32, int(self.settings["steps"])),
+                dr.opaque(mi.Float, float(self.settings["tolerance"])),
+            )
+            specular = averaged(color, fine, grid)
+        return Prediction(base + specular, specular, extra=_effort(surfaces["glossy"], made))
+
+
+def _effort(glossy: Any, made: Any) -> dict[str, float]:
+    """Steps that the searches of a glossy camera ray took together, in the mean."""
+    count = dr.count(glossy)[0]
+    return {"search_steps": float(dr.sum(mi.Float(made))[0]) / count if count else 0.0}
