@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 from gibench.errors import GibenchError
 from gibench.rendering.backend import is_scalar
 
+NEAREST_TARGET = 1e-9
+"""Metres: a target that is no farther away gives no direction."""
+
 
 class CameraError(GibenchError, ValueError):
     """A camera that sees nothing, or a resolution that is none."""
@@ -30,7 +33,8 @@ class PinholeCamera:
     def __post_init__(self) -> None:
         """Raises CameraError for what is no camera."""
         finite = np.isfinite([*self.position, *self.target, self.fov]).all()
-        if not finite or not 0 < self.fov < np.pi or np.allclose(self.position, self.target, atol=1e-9):
+        apart = np.linalg.norm(np.subtract(self.target, self.position)) > NEAREST_TARGET if finite else False
+        if not (apart and 0 < self.fov < np.pi):
             raise CameraError(
                 f"camera at {self.position} towards {self.target} with a field of view of {self.fov} rad: position "
                 "and target must be finite and apart, the field of view between 0 and pi"
@@ -88,7 +92,7 @@ class RayGenerator:
 
         width, height = check_resolution(resolution)
         focal = camera.focal_length(width)
-        self._origin = mi.Point3f(list(camera.position))
+        self._origin = mi.Point3f([float(c) for c in camera.position])
         self._axes = [mi.Vector3f(row.tolist()) for row in camera.frame]
         self._scale = mi.Float(1 / focal)
         self._centre = mi.Vector2f(0.5 * width, 0.5 * height)
