@@ -1,0 +1,113 @@
+"""Pieces of small scenes in Mitsuba's dictionary form; Z up, metres."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+
+def rgb(*value: float) -> dict[str, Any]:
+    """A colour from three numbers, or a grey from one."""
+    return {"type": "rgb", "value": list(value) if len(value) > 1 else [value[0]] * 3}
+
+
+def two_sided(**bsdf: Any) -> dict[str, Any]:
+    """A material that both sides of a surface have."""
+    return {"type": "twosided", "inside": bsdf}
+
+
+def diffuse(*reflectance: float) -> dict[str, Any]:
+    """A matt material of both sides."""
+    return two_sided(type="diffuse", reflectance=rgb(*reflectance))
+
+
+def metal(alpha: float) -> dict[str, Any]:
+    """A rough conductor that absorbs nothing."""
+    return two_sided(type="roughconductor", material="none", alpha=alpha, distribution="ggx")
+
+
+def coat(alpha: float, *reflectance: float) -> dict[str, Any]:
+    """A matt base under a rough coat of index 1.5, as `gibench.generators.materials` writes it."""
+    return two_sided(
+        type="roughplastic",
+        alpha=alpha,
+        distribution="ggx",
+        int_ior=1.5,
+        nonlinear=False,
+        diffuse_reflectance=rgb(*reflectance),
+    )
+
+
+def area(*radiance: float) -> dict[str, Any]:
+    """An area light."""
+    return {"type": "area", "radiance": rgb(*radiance)}
+
+
+def constant(radiance: float) -> dict[str, Any]:
+    """The same light from everywhere."""
+    return {"type": "constant", "radiance": rgb(radiance)}
+
+
+def rectangle(centre: ArrayLike, normal: ArrayLike, half: tuple[float, float], **more: Any) -> dict[str, Any]:
+    """A rectangle of half sides `half` that faces along `normal`."""
+    import mitsuba as mi
+
+    centre, normal = np.asarray(centre, dtype=float), np.asarray(normal, dtype=float)
+    up = [0.0, 1.0, 0.0] if abs(normal[2]) > 0.5 else [0.0, 0.0, 1.0]
+    place = mi.ScalarTransform4f().look_at(origin=centre.tolist(), target=(centre + normal).tolist(), up=up)
+    return {
+        "type": "rectangle",
+        "to_world": place @ mi.ScalarTransform4f().scale([half[0], half[1], 1]),
+        **more,
+    }
+
+
+def furnace(bsdf: dict[str, Any], radiance: float = 1.0) -> dict[str, Any]:
+    """A sphere of radius 1 at the origin under uniform light from everywhere."""
+    return {
+        "type": "scene",
+        "light": constant(radiance),
+        "ball": {"type": "sphere", "radius": 1.0, "bsdf": bsdf},
+    }
+
+
+def closed_box(reflectance: float, emitted: float, *, half: float = 1.0) -> dict[str, Any]:
+    """A cube around the origin whose six walls emit `emitted` and reflect `reflectance`. half: of its side."""
+    walls = {
+        f"wall{axis}{side}": rectangle(
+            [side * half if a == axis else 0 for a in range(3)],
+            [-side if a == axis else 0 for a in range(3)],
+            (half, half),
+            bsdf={"type": "diffuse", "reflectance": rgb(reflectance)},
+            emitter=area(emitted),
+        )
+        for axis in range(3)
+        for side in (-1, 1)
+    }
+    return {"type": "scene", **walls}
+
+
+def closed_answer(reflectance: float, emitted: float, depth: int) -> float:
+    """Radiance in a closed scene whose surfaces all emit and reflect alike, whatever its shape.
+
+    Scattering event k brings emitted · reflectanceᵏ, and there are at most `depth` of them.
+    """
+    return float(emitted * np.sum(np.float64(reflectance) ** np.arange(depth + 1)))
+
+
+def mesh(vertices: ArrayLike, faces: ArrayLike, **more: Any) -> Any:
+    """A `mitsuba.Mesh` without normals of its own. vertices: (V, 3), metres. faces: (F, 3). more: bsdf, emitter."""
+    import mitsuba as mi
+
+    corners, triangles = np.asarray(vertices, dtype=np.float32), np.asarray(faces, dtype=np.uint32)
+    properties = mi.Properties()
+    for name, plugin in more.items():
+        properties[name] = mi.load_dict(plugin)
+    shape = mi.Mesh("mesh", len(corners), len(triangles), props=properties)
+    parameters = mi.traverse(shape)
+    parameters["vertex_positions"] = corners.ravel()
+    parameters["faces"] = triangles.ravel()
+    parameters.update()
+    return shape
