@@ -53,6 +53,12 @@ class PinholeCamera:
         right = right / length if length > 1e-7 else np.array([1.0, 0.0, 0.0])
         return np.array([right, np.cross(forward, right), forward])
 
+    @property
+    def up(self) -> tuple[float, float, float]:
+        """What a look-at transform takes as up: Z, or the top of the image where the view is along Z or next to it."""
+        x, y, z = -self.frame[1]
+        return (0.0, 0.0, 1.0) if z > 1e-3 else (float(x), float(y), float(z))
+
     def focal_length(self, width: int) -> float:
         """In pixels."""
         return 0.5 * width / float(np.tan(0.5 * self.fov))

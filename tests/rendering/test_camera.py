@@ -44,3 +44,16 @@ def test_numbers_of_numpy_make_a_camera_that_renders():
     second = render_frame(scene, camera, previous_camera=camera, **options).arrays
     for name, values in first.items():
         np.testing.assert_array_equal(values, second[name])
+
+
+@pytest.mark.parametrize("target", [(0, 0, -1), (0, 0, 1), (1e-5, 2e-5, -1), (1, 0, -1e3), (1, 2, 0.5)])
+def test_up_gives_a_look_at_transform_with_the_same_axes(target):
+    import mitsuba as mi
+
+    camera = PinholeCamera((0, 0, 0), target, 1.0)
+    place = mi.ScalarTransform4f().look_at(
+        origin=[0, 0, 0], target=list(map(float, target)), up=list(camera.up)
+    )
+    right, down, forward = camera.frame
+    # Mitsuba's x points left.
+    np.testing.assert_allclose(np.array(place.matrix)[:3, :3].T, [-right, -down, forward], atol=1e-5)
