@@ -67,11 +67,18 @@ def not_finite(arrays: dict[str, NDArray[Any]]) -> int:
     return int(sum((~np.isfinite(values)).sum() for values in arrays.values()))
 
 
-def parallel_rectangle(half_x: float, half_y: float, height: float) -> float:
-    """Form factor from a point to a parallel rectangle above it, centred (Howell's catalogue, B-3, four corners)."""
-    x, y = half_x / height, half_y / height
-    a, b = np.sqrt(1 + x * x), np.sqrt(1 + y * y)
-    return float(4 * (x / a * np.arctan(y / a) + y / b * np.arctan(x / b)) / (2 * np.pi))
+def parallel_rectangle(half_x: float, half_y: float, height: float, x: float = 0.0, y: float = 0.0) -> float:
+    """Form factor from a point to a parallel rectangle above it (Howell's catalogue, B-3, corner by corner).
+
+    half_x, half_y: of its sides; x, y: of its centre beside the point; metres.
+    """
+
+    def corner(u: float, v: float) -> float:
+        a, b = np.hypot(u, height), np.hypot(v, height)
+        return float(u / a * np.arctan(v / a) + v / b * np.arctan(u / b)) / (2 * np.pi)
+
+    x0, x1, y0, y1 = x - half_x, x + half_x, y - half_y, y + half_y
+    return corner(x1, y1) - corner(x0, y1) - corner(x1, y0) + corner(x0, y0)
 
 
 def perpendicular_rectangle(half_width: float, length: float, gap: float) -> float:

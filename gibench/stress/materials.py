@@ -8,7 +8,7 @@ import numpy as np
 
 from gibench.datasets import exr
 from gibench.rendering.camera import PinholeCamera
-from gibench.rendering.render import RenderedFrame, render_frame
+from gibench.rendering.render import render_frame
 from gibench.rendering.scene import load_dict
 from gibench.stress.answers import RAY_OFFSET, ggx_albedo, mean_check, not_finite, worst
 from gibench.stress.registry import Check, Found, case
@@ -24,6 +24,7 @@ from gibench.stress.scenes import (
     rgb,
     two_sided,
 )
+from gibench.stress.views import INSIDE, POINT, seen, spot
 
 ALPHAS = (1e-4, 1e-3, 1e-2)
 
@@ -32,8 +33,6 @@ COAT_INDEX = 1.5 / 1.000277
 
 GRAZING = 89.9
 """Degrees from the normal."""
-
-INSIDE = PinholeCamera((0.0, 0.0, 0.0), (1.0, 0.2, 0.1), 1.2)
 
 QUADRATURE = "quadrature over GGX slopes in float64; noise"
 SERIES = "sum of the series; noise"
@@ -44,22 +43,10 @@ COAT_ENERGY = (
 )
 
 
-def spot(degrees: float) -> PinholeCamera:
-    """A camera 4 m from the origin, `degrees` from the z axis, that sees one point of the floor."""
-    angle = np.radians(degrees)
-    return PinholeCamera((0.0, -4 * np.sin(angle), 4 * np.cos(angle)), (0.0, 0.0, 0.0), 1e-5)
-
-
 def floor_under_sky(bsdf: dict[str, Any]) -> Any:
     """A floor of 2 × 2 m under uniform light."""
     floor = rectangle([0, 0, 0], [0, 0, 1], (1, 1), bsdf=bsdf)
     return load_dict({"type": "scene", "sky": constant(1.0), "floor": floor})
-
-
-def seen(scene: Any, camera: PinholeCamera, **options: Any) -> RenderedFrame:
-    """Radiance of a few pixels, with many samples."""
-    given: dict[str, Any] = {"resolution": (16, 16), "channels": ["radiance"], "spp": 1024} | options
-    return render_frame(scene, camera, **given)
 
 
 def alpha_kept(scene: Any, alpha: float) -> Found:
@@ -196,7 +183,7 @@ def facing_mirrors() -> Found:
             "right": rectangle([0.5, 0, 0], [-1, 0, 0], (2, 2), bsdf=mirror),
         }
     )
-    camera = PinholeCamera((0.0, 0.0, 0.0), (1.0, 0.05, 0.0), 1e-5)
+    camera = PinholeCamera((0.0, 0.0, 0.0), (1.0, 0.05, 0.0), POINT)
     frame = seen(scene, camera, max_depth=64)
     yield mean_check("light", "radiance at the end", frame, 0.98**40, "0.98⁴⁰; noise")
     matt = float(frame.arrays["direct_diffuse"].max() + frame.arrays["indirect_diffuse"].max())
