@@ -180,7 +180,7 @@ def bright_beside_dim() -> Found:
     yield Check(
         "metrics", "display values outside [0, 1]", float(((shown < 0) | (shown > 1)).sum()), 0, "sRGB"
     )
-    yield Check("metrics", "relMSE with itself", relmse(color, color), 0, "an identity")
+    yield Check("metrics", "relMSE with itself", float(relmse(color, color)), 0, "an identity")
 
 
 @case(

@@ -24,7 +24,7 @@ from gibench.stress.scenes import (
     rgb,
     two_sided,
 )
-from gibench.stress.views import INSIDE, POINT, seen, spot
+from gibench.stress.views import INSIDE, POINT, SURFACE_SETS, seen, spot
 
 ALPHAS = (1e-4, 1e-3, 1e-2)
 
@@ -125,9 +125,7 @@ def grazing_matt() -> Found:
     yield mean_check(
         "light", "uniform light reflected", seen(scene, spot(GRAZING)), 0.5, "reflectance; noise"
     )
-    frame = render_frame(
-        scene, spot(GRAZING), resolution=(1, 1), channels=["surface", "reflection", "curvature"]
-    )
+    frame = render_frame(scene, spot(GRAZING), resolution=(1, 1), channels=SURFACE_SETS)
     cosine = np.cos(np.radians(GRAZING))
     # The height of the ray is rounded at both ends, and meets the floor at this angle.
     bound = float(8 * 2.0**-24 / cosine)

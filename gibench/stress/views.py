@@ -7,8 +7,12 @@ from typing import Any
 import numpy as np
 
 from gibench.rendering.camera import PinholeCamera
+from gibench.rendering.channels import SETS
 from gibench.rendering.render import RenderedFrame, render_frame
 from gibench.rendering.scene import Scene
+
+SURFACE_SETS = tuple(name for name in SETS if name != "radiance")
+"""All channels that are not radiance."""
 
 POINT = 1e-5
 """Field of view, radians, within which a scene is a point."""

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import pytest
 
 from gibench.stress.registry import FAIL, MENDED, SUBJECTS, Check, all_cases
@@ -25,6 +28,15 @@ def test_every_case_has_a_name_of_its_own_and_a_subject():
     names = [one.name for one in CASES]
     assert len(set(names)) == len(names)
     assert {one.subject for one in CASES} == set(SUBJECTS)
+
+
+def test_listing_the_cases_loads_neither_mitsuba_nor_torch():
+    code = (
+        "import sys; from gibench.stress.registry import all_cases; all_cases(); "
+        "print(sorted({'mitsuba', 'drjit', 'torch'} & set(sys.modules)))"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    assert result.stdout.strip() == "[]", result.stdout + result.stderr
 
 
 def test_every_subject_has_a_quick_case():
