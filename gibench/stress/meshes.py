@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Vertices = NDArray[np.float64]
-Faces = NDArray[np.int64]
+Faces = NDArray[np.int32]
 
 
 def cube(ticks: NDArray[np.float64] | None = None, *, half: float = 1.0) -> tuple[Vertices, Faces]:
@@ -30,7 +30,7 @@ def cube(ticks: NDArray[np.float64] | None = None, *, half: float = 1.0) -> tupl
             place[:, axis], place[:, (axis + 1) % 3], place[:, (axis + 2) % 3] = side, across, along
             faces.append((front if side < 0 else front[:, ::-1]) + len(vertices) * count * count)
             vertices.append(place)
-    return np.concatenate(vertices) * half, np.concatenate(faces)
+    return np.concatenate(vertices) * half, np.concatenate(faces).astype(np.int32)
 
 
 def needles() -> tuple[Vertices, Faces]:
@@ -43,7 +43,7 @@ def with_degenerate() -> tuple[Vertices, Faces]:
     """As many triangles again without area: some have two equal corners, some three on a line."""
     vertices, faces = cube(np.linspace(-1, 1, 5))
     flat = np.concatenate([faces[:, [0, 0, 1]], faces[:, [0, 1, 0]], np.tile([[0, 1, 2]], (50, 1))])
-    return vertices, np.concatenate([flat, faces])
+    return vertices, np.concatenate([flat, faces]).astype(np.int32)
 
 
 def doubled() -> tuple[Vertices, Faces]:
