@@ -31,7 +31,10 @@ class PinholeCamera:
     fov: float
 
     def __post_init__(self) -> None:
-        """Raises CameraError for what is no camera."""
+        """Raises CameraError for what is no camera. Numbers of NumPy become Python's, which alone Mitsuba takes."""
+        for name in ("position", "target"):
+            object.__setattr__(self, name, tuple(float(c) for c in getattr(self, name)))
+        object.__setattr__(self, "fov", float(self.fov))
         finite = np.isfinite([*self.position, *self.target, self.fov]).all()
         apart = np.linalg.norm(np.subtract(self.target, self.position)) > NEAREST_TARGET if finite else False
         if not (apart and 0 < self.fov < np.pi):
@@ -98,7 +101,7 @@ class RayGenerator:
 
         width, height = check_resolution(resolution)
         focal = camera.focal_length(width)
-        self._origin = mi.Point3f([float(c) for c in camera.position])
+        self._origin = mi.Point3f(list(camera.position))
         self._axes = [mi.Vector3f(row.tolist()) for row in camera.frame]
         self._scale = mi.Float(1 / focal)
         self._centre = mi.Vector2f(0.5 * width, 0.5 * height)

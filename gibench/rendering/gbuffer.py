@@ -117,7 +117,7 @@ def _motion(
     ahead &= dr.all(dr.isfinite(offset))
     offset = dr.select(ahead, offset, 0)
     inside = ahead & (x >= 0) & (x < width) & (y >= 0) & (y < height)
-    origin = mi.Point3f([float(c) for c in previous.position])
+    origin = mi.Point3f(list(previous.position))
     towards = hit.si.p - origin
     distance = dr.norm(towards)
     ray = mi.Ray3f(origin, towards / distance)
