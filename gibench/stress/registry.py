@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-SUBJECTS = ("materials", "lights", "geometry", "cameras", "numbers", "methods")
+SUBJECTS = ("materials", "lights", "geometry", "cameras", "numbers", "methods", "statistics")
 """Modules of this package that hold cases, in the order of the table."""
 
 PARTS = (

@@ -111,3 +111,32 @@ def mesh(vertices: ArrayLike, faces: ArrayLike, **more: Any) -> Any:
     parameters["faces"] = triangles.ravel()
     parameters.update()
     return shape
+
+
+def small_room(*, glossy: bool = True) -> dict[str, Any]:
+    """A room of 2 × 2 × 2 m, open to −y, with a lamp below its ceiling.
+
+    glossy: with a coated floor, and balls that are coated, of metal and a mirror; otherwise all is matt.
+    """
+    wall = diffuse(0.7, 0.65, 0.6)
+    room: dict[str, Any] = {
+        "type": "scene",
+        "floor": rectangle([0, 0, 0], [0, 0, 1], (1, 1), bsdf=diffuse(0.4, 0.3, 0.2)),
+        "ceiling": rectangle([0, 0, 2], [0, 0, -1], (1, 1), bsdf=wall),
+        "back": rectangle([0, 1, 1], [0, -1, 0], (1, 1), bsdf=wall),
+        "left": rectangle([-1, 0, 1], [1, 0, 0], (1, 1), bsdf=diffuse(0.6, 0.2, 0.2)),
+        "right": rectangle([1, 0, 1], [-1, 0, 0], (1, 1), bsdf=diffuse(0.2, 0.5, 0.2)),
+        "lamp": rectangle([0, 0, 1.95], [0, 0, -1], (0.25, 0.25), bsdf=wall, emitter=area(8, 7, 6)),
+    }
+    if not glossy:
+        return room
+    copper = two_sided(type="roughconductor", material="Cu", alpha=0.2, distribution="ggx")
+    balls = {
+        "coated": ([-0.4, 0.2, 0.4], 0.35, coat(0.1, 0.5, 0.2, 0.1)),
+        "metal": ([0.35, -0.1, 0.25], 0.25, copper),
+        "mirror": ([0.55, 0.5, 0.7], 0.2, two_sided(type="conductor", material="Al")),
+    }
+    room["floor"]["bsdf"] = coat(0.05, 0.4, 0.3, 0.2)
+    for name, (centre, radius, bsdf) in balls.items():
+        room[name] = {"type": "sphere", "center": centre, "radius": radius, "bsdf": bsdf}
+    return room

@@ -20,6 +20,9 @@ POINT = 1e-5
 INSIDE = PinholeCamera((0.0, 0.0, 0.0), (1.0, 0.2, 0.1), 1.2)
 """From the middle of a closed box."""
 
+SMALL_ROOM = PinholeCamera((0.0, -3.4, 1.0), (0.0, 0.0, 0.95), np.radians(45.0))
+"""Into `scenes.small_room`, from its open side."""
+
 
 def spot(degrees: float) -> PinholeCamera:
     """A camera 4 m from the origin, `degrees` from the z axis, that sees one point of a floor at z = 0."""
