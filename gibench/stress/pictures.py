@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gibench.benchmarks.report.plot_style import FAINT, INK, STYLE, save
+from gibench.stress.curves import plot
 from gibench.stress.registry import FAIL, KNOWN, MENDED, PARTS
 from gibench.stress.running import Report, Row
 
@@ -23,8 +24,11 @@ COLOURS = {FAIL: "#D55E00", KNOWN: "#E69F00", MENDED: "#56B4E9"}
 
 
 def write_pictures(report: Report, out: Path) -> list[Path]:
-    """Write stress.svg and stress.png; returns their paths."""
-    return save(table_picture(report), out, "stress")
+    """Write stress.svg and stress.png, and a plot of each curve that there is; returns their paths."""
+    written = save(table_picture(report), out, "stress")
+    for curve in report.curves:
+        written += save(plot(curve), out, curve.name)
+    return written
 
 
 def table_picture(report: Report) -> Figure:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-SUBJECTS = ("materials", "lights", "geometry", "cameras", "numbers", "methods", "statistics")
+SUBJECTS = ("materials", "lights", "geometry", "cameras", "numbers", "methods", "statistics", "speed")
 """Modules of this package that hold cases, in the order of the table."""
 
 PARTS = (

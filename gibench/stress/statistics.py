@@ -81,7 +81,7 @@ SKEWED = (
 )
 
 
-@case("64 seeds of a {kind} room, beside path", kind=("matt", "glossy"), quick=())
+@case("64 seeds of a {kind} room, beside path", kind=("matt", "glossy"))
 def seeds_against_path(kind: str) -> Found:
     """Every pixel of a room against Mitsuba's own integrator, 64 seeds of each; then its error bars."""
     import mitsuba as mi
@@ -166,7 +166,7 @@ UNGAINFUL = {("a small room", 64), ("a lamp of 1 mm", 64)}
 """Where the denoiser's blur is more than the noise."""
 
 
-@case("denoising {what}", what=tuple(DENOISED), quick=("a small room",))
+@case("denoising {what}", what=tuple(DENOISED), quick=("a gap of 1 cm",))
 def denoising(what: str) -> Found:
     """Error with the denoiser over error without, at 16 and 64 samples a pixel."""
     scene, camera = DENOISED[what]()
