@@ -35,7 +35,8 @@ def plot(curve: Curve) -> Figure:
                 axes.annotate(
                     f"{row['spp']}",
                     (row["seconds"], row["relmse"]),
-                    xytext=(3, 3),
+                    xytext=(4, 3) if position % 2 == 0 else (-4, -8),
+                    ha="left" if position % 2 == 0 else "right",
                     textcoords="offset points",
                     fontsize=6.5,
                     color=FAINT,

@@ -38,8 +38,8 @@ QUADRATURE = "quadrature over GGX slopes in float64; noise"
 SERIES = "sum of the series; noise"
 
 COAT_ENERGY = (
-    "Mitsuba's roughplastic tabulates what leaves the base in few nodes: a white base comes out 2.2 % dark, in stock "
-    "`path` too"
+    "Mitsuba's roughplastic loses it, and the mean weight of its own samples is as low: a white base comes out 2.2 % "
+    "dark"
 )
 
 
@@ -115,6 +115,14 @@ def grazing_metal(alpha: float) -> Found:
     """Half of the facets are hidden, and half of what the others reflect goes down."""
     frame = seen(floor_under_sky(metal(alpha)), spot(GRAZING))
     answer = ggx_albedo(alpha, np.radians(GRAZING))
+    yield mean_check("light", "uniform light reflected", frame, answer, QUADRATURE)
+
+
+@case("grazing view at 89.9°, coat, alpha {alpha:g}", alpha=ALPHAS)
+def grazing_coat(alpha: float) -> Found:
+    """The same facets of a dielectric, over a base that is black."""
+    frame = seen(floor_under_sky(coat(alpha, 0.0)), spot(GRAZING))
+    answer = ggx_albedo(alpha, np.radians(GRAZING), index=COAT_INDEX)
     yield mean_check("light", "uniform light reflected", frame, answer, QUADRATURE)
 
 

@@ -1,4 +1,4 @@
-"""Meshes of a closed cube, whole and broken. Vertices (V, 3) in metres, faces (F, 3) whose fronts look inside."""
+"""Meshes of a closed cube of 2 m, whole and broken: (V, 3) vertices in metres, (F, 3) faces that look inside."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ Vertices = NDArray[np.float64]
 Faces = NDArray[np.int32]
 
 
-def cube(ticks: NDArray[np.float64] | None = None, *, half: float = 1.0) -> tuple[Vertices, Faces]:
+def cube(ticks: NDArray[np.float64] | None = None) -> tuple[Vertices, Faces]:
     """Six sides, each a grid of two triangles a cell.
 
-    ticks: ascending, from −1 to 1: where the lines of the grid are, the two ends alone by default. half: of the side.
+    ticks: ascending, from −1 to 1: where the lines of the grid are, the two ends alone by default.
     """
     at = np.array([-1.0, 1.0]) if ticks is None else ticks
     count = len(at)
@@ -30,7 +30,7 @@ def cube(ticks: NDArray[np.float64] | None = None, *, half: float = 1.0) -> tupl
             place[:, axis], place[:, (axis + 1) % 3], place[:, (axis + 2) % 3] = side, across, along
             faces.append((front if side < 0 else front[:, ::-1]) + len(vertices) * count * count)
             vertices.append(place)
-    return np.concatenate(vertices) * half, np.concatenate(faces).astype(np.int32)
+    return np.concatenate(vertices), np.concatenate(faces).astype(np.int32)
 
 
 def needles() -> tuple[Vertices, Faces]:

@@ -86,21 +86,25 @@ def _cell(axes, x: float, y: float, row: Row) -> None:  # type: ignore[no-untype
     from matplotlib.patches import Rectangle
 
     share, verdict = _share(row), row.check.verdict
-    depth = 0.0 if share == 0 else min(max(1 + math.log10(max(share, LEAST)) / 3, 0.0), 1.0)
-    # From white to the green of "bluish green" as the bound is used up.
+    depth = 0.1 + 0.9 * min(max(1 + math.log10(max(share, LEAST)) / 3, 0.0), 1.0)
+    # From next to white to the green of "bluish green" as the bound is used up.
     green = tuple(1 - depth * (1 - channel) * 0.75 for channel in (0.0, 0.62, 0.45))
     axes.add_patch(
         Rectangle(
             (x + 0.02, y + 0.01), CELL - 0.04, ROW_HEIGHT - 0.02, facecolor=COLOURS.get(verdict, green), lw=0
         )
     )
-    text = (
-        "0"
-        if share == 0
-        else "∞"
-        if math.isinf(share)
-        else f"{share:.0f}×"
-        if share >= 10
-        else f"{share:.1g}"
-    )
-    axes.text(x + CELL / 2, y + ROW_HEIGHT / 2, text, ha="center", va="center", fontsize=6, color=INK)
+    axes.text(x + CELL / 2, y + ROW_HEIGHT / 2, _text(share), ha="center", va="center", fontsize=6, color=INK)
+
+
+def _text(share: float) -> str:
+    """A share of a bound in at most five signs."""
+    if share == 0:
+        return "0"
+    if share < LEAST:
+        return f"<{LEAST:g}".replace("0.", ".")
+    if math.isinf(share):
+        return "∞"
+    if share > 1:
+        return f"{share:.0f}×" if share >= 9.5 else f"{share:.1f}×"
+    return f"{share:.1g}"

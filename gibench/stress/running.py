@@ -59,8 +59,10 @@ def rows_of(case: Case) -> Iterator[Row | Curve]:
     start = time.perf_counter()
     try:
         for found in case.run():
-            now = time.perf_counter()
-            yield found if isinstance(found, Curve) else Row(case.subject, case.name, found, now - start)
+            if isinstance(found, Curve):
+                yield found
+                continue
+            yield Row(case.subject, case.name, found, time.perf_counter() - start)
             start = time.perf_counter()
     except Exception as problem:
         if os.environ.get("GIBENCH_DEBUG"):

@@ -64,22 +64,13 @@ def rectangle(centre: ArrayLike, normal: ArrayLike, half: tuple[float, float], *
     }
 
 
-def furnace(bsdf: dict[str, Any], radiance: float = 1.0) -> dict[str, Any]:
-    """A sphere of radius 1 at the origin under uniform light from everywhere."""
-    return {
-        "type": "scene",
-        "light": constant(radiance),
-        "ball": {"type": "sphere", "radius": 1.0, "bsdf": bsdf},
-    }
-
-
-def closed_box(reflectance: float, emitted: float, *, half: float = 1.0) -> dict[str, Any]:
-    """A cube around the origin whose six walls emit `emitted` and reflect `reflectance`. half: of its side."""
+def closed_box(reflectance: float, emitted: float) -> dict[str, Any]:
+    """A cube of 2 m around the origin whose six walls emit `emitted` and reflect `reflectance`."""
     walls = {
         f"wall{axis}{side}": rectangle(
-            [side * half if a == axis else 0 for a in range(3)],
+            [side if a == axis else 0 for a in range(3)],
             [-side if a == axis else 0 for a in range(3)],
-            (half, half),
+            (1, 1),
             bsdf={"type": "diffuse", "reflectance": rgb(reflectance)},
             emitter=area(emitted),
         )

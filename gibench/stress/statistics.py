@@ -17,7 +17,7 @@ from gibench.stress.answers import Float64, largest_z
 from gibench.stress.lights import BELOW, behind_a_gap, floor, lamp
 from gibench.stress.registry import Check, Found, case
 from gibench.stress.scenes import area, closed_answer, closed_box, constant, metal, rectangle, small_room
-from gibench.stress.views import INSIDE, SMALL_ROOM
+from gibench.stress.views import INSIDE, SMALL_ROOM, render_path
 
 SEEDS = 64
 
@@ -84,34 +84,12 @@ SKEWED = (
 @case("64 seeds of a {kind} room, beside path", kind=("matt", "glossy"))
 def seeds_against_path(kind: str) -> Found:
     """Every pixel of a room against Mitsuba's own integrator, 64 seeds of each; then its error bars."""
-    import mitsuba as mi
-
     scene, spp = load_dict(small_room(glossy=kind == "glossy")), 64
     color, error = replicates(scene, SMALL_ROOM, spp)
-    place = mi.ScalarTransform4f().look_at(
-        origin=list(SMALL_ROOM.position), target=list(SMALL_ROOM.target), up=[0, 0, 1]
-    )
-    sensor = mi.load_dict(
-        {
-            "type": "perspective",
-            "fov": float(np.degrees(SMALL_ROOM.fov)),
-            "fov_axis": "x",
-            "near_clip": 1e-4,
-            "to_world": place,
-            "film": {
-                "type": "hdrfilm",
-                "width": RESOLUTION[0],
-                "height": RESOLUTION[1],
-                "rfilter": {"type": "box"},
-                "pixel_format": "rgb",
-                "component_format": "float32",
-            },
-        }
-    )
-    path = mi.load_dict({"type": "path", "max_depth": DEPTH + 1, "rr_depth": 1000})
+    given: dict[str, Any] = {"spp": spp, "max_depth": DEPTH}
     theirs = np.array(
         [
-            np.array(mi.render(scene.mi_scene, sensor=sensor, integrator=path, spp=spp, seed=SEEDS + seed))
+            render_path(scene.mi_scene, SMALL_ROOM, RESOLUTION, seed=SEEDS + seed, **given)
             for seed in range(SEEDS)
         ],
         dtype=np.float64,

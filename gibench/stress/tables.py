@@ -74,7 +74,7 @@ def markdown(report: Report) -> str:
             reasons.setdefault(row.check.known, []).append(row.case)
     if reasons:
         lines += ["### Known", ""]
-        lines += [f"- {', '.join(dict.fromkeys(cases))}: {reason}." for reason, cases in reasons.items()]
+        lines += [f"- {'; '.join(dict.fromkeys(cases))}: {reason}." for reason, cases in reasons.items()]
         lines.append("")
     return "\n".join(lines)
 

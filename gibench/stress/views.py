@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.channels import SETS
@@ -34,3 +35,45 @@ def seen(scene: Scene, camera: PinholeCamera, **options: Any) -> RenderedFrame:
     """A frame of 16 × 16 pixels of 1024 samples, or with other `options` of `render_frame`."""
     given: dict[str, Any] = {"resolution": (16, 16), "channels": ["radiance"], "spp": 1024} | options
     return render_frame(scene, camera, **given)
+
+
+def render_path(
+    mi_scene: Any,
+    camera: PinholeCamera,
+    resolution: tuple[int, int],
+    *,
+    spp: int,
+    seed: int,
+    max_depth: int,
+    rr_depth: int = 1000,
+) -> NDArray[np.float32]:
+    """Mitsuba's own `path` through a box filter, (H, W, 3): the independent implementation.
+
+    max_depth: scattering events. rr_depth: from which on Russian roulette may end a path; by default it never does.
+    """
+    import mitsuba as mi
+
+    film = {
+        "type": "hdrfilm",
+        "width": resolution[0],
+        "height": resolution[1],
+        "rfilter": {"type": "box"},
+        "pixel_format": "rgb",
+        "component_format": "float32",
+    }
+    place = mi.ScalarTransform4f().look_at(
+        origin=list(camera.position), target=list(camera.target), up=list(camera.up)
+    )
+    sensor = mi.load_dict(
+        {
+            "type": "perspective",
+            "fov": float(np.degrees(camera.fov)),
+            "fov_axis": "x",
+            "near_clip": 1e-4,
+            "to_world": place,
+            "film": film,
+            "sampler": {"type": "independent"},
+        }
+    )
+    integrator = mi.load_dict({"type": "path", "max_depth": max_depth + 1, "rr_depth": rr_depth})
+    return np.array(mi.render(mi_scene, sensor=sensor, integrator=integrator, spp=spp, seed=seed))

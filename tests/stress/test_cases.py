@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import warnings
 
 import pytest
 
@@ -20,8 +21,10 @@ CASES = all_cases()
 def test_case(case):
     checks = [row.check for row in rows_of(case) if hasattr(row, "check")]
     assert checks
-    wrong = [check for check in checks if check.verdict in (FAIL, MENDED)]
-    assert wrong == []
+    for check in checks:
+        if check.verdict == MENDED:
+            warnings.warn(f"{case.name}: {check.what} is listed as known, and passes here", stacklevel=1)
+    assert [check for check in checks if check.verdict == FAIL] == []
 
 
 def test_every_case_has_a_name_of_its_own_and_a_subject():
