@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import importlib.util
 import os
 import re
@@ -14,13 +15,15 @@ import numpy as np
 import pytest
 
 from gibench.cli import run
-from gibench.cli.app import make_app
+from gibench.cli.app import app, make_app
 from gibench.datasets import load_preset, load_recipe, open_dataset
 from gibench.datasets.manifest import COLUMNS
 from gibench.generators.furniture import FAMILIES, Family
 from gibench.generators.layouts import dressing
 from gibench.generators.materials import MATERIALS, SLOTS, MaterialFamily, SlotRule
 from gibench.generators.rooms import sample_room
+from gibench.stress.registry import all_cases
+from gibench.stress.running import Report
 from tests.generators import test_furniture as furniture_tests
 from tests.generators.materials import test_families as material_tests
 
@@ -92,6 +95,44 @@ def test_commands_that_make_datasets_are_understood(home, words, monkeypatch):
         assert recipe.identity() == preset.identity()
     if "--out" in words:
         assert asked[0][0] == Path(words[words.index("--out") + 1])
+
+
+@pytest.mark.parametrize(
+    "words", [*command_lines("docs/stability.md"), *command_lines("docs/presets.md")], ids=shlex.join
+)
+def test_commands_of_the_stress_suite_are_understood(words, tmp_path, monkeypatch):
+    """Running the cases is what tests/stress does."""
+    asked = []
+
+    def instead(**given):
+        asked.append(given)
+        return Report((), (), 0, 0.0)
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("gibench.stress.running.run", instead)
+    assert run(app, words[1:]) == 0
+    assert asked[0]["quick"] == ("--quick" in words)
+    assert (tmp_path / words[words.index("--out") + 1] / "stress.csv").is_file()
+
+
+def test_the_table_of_the_stress_suite_is_that_of_its_cases():
+    names = set(re.findall(r"^\| ([^|]+) \| [^|]+ \|(?: [^|]+ \|){6}$", page("stability"), re.M))
+    assert names - {"case", "---"} == {case.name for case in all_cases()}
+
+
+def test_the_tables_of_the_presets_are_the_curve_and_the_recipes():
+    with open(ROOT / "docs/stability/speed-furnished-room.csv", newline="") as file:
+        measured = {(row["setting"], row["spp"]): float(row["relmse"]) for row in csv.DictReader(file)}
+    table = page("presets").split("| samples |")[1].split("\n\n")[0].splitlines()[2:]
+    for line in table:
+        spp, raw, denoised = (cell.strip() for cell in line.split("|")[1:4])
+        assert float(raw) == pytest.approx(measured["stratified", spp], rel=0.05)
+        assert float(denoised) == pytest.approx(measured["stratified, denoised", spp], rel=0.05)
+    for name, (samples, denoised) in {
+        name: (int(spp), how == "denoised")
+        for name, spp, how in re.findall(r"^\| `(\w+)` \| (\d+), (\w+) \|", page("presets"), re.M)
+    }.items():
+        assert (load_preset(name).spp, load_preset(name).denoise) == (samples, denoised)
 
 
 def test_the_recipe_shows_the_defaults(home):

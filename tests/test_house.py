@@ -20,7 +20,8 @@ MAY_IMPORT = {
     "datasets": {"rendering", "generators", "metrics"},
     "baselines": {"rendering", "datasets", "metrics"},
     "benchmarks": {"rendering", "generators", "metrics", "datasets", "baselines"},
-    "cli": {"rendering", "generators", "metrics", "datasets", "baselines", "benchmarks"},
+    "stress": {"rendering", "generators", "metrics", "datasets", "baselines", "benchmarks"},
+    "cli": {"rendering", "generators", "metrics", "datasets", "baselines", "benchmarks", "stress"},
 }
 
 

@@ -21,6 +21,7 @@ from gibench.generators.materials import bsdf_xml, tile_size
 from gibench.generators.outside import GROUND, ground_element
 from gibench.generators.panorama import write_panorama
 from gibench.generators.parts import Camera, Light, Mesh, Room, Texture
+from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.scene import OPENINGS
 
 PANORAMA = "textures/environment.hdr"  # what lies outside the windows
@@ -126,8 +127,9 @@ def _sensor(camera: Camera, name: str, resolution: tuple[int, int], spp: int) ->
     SubElement(sensor, "float", name="fov", value=_number(np.degrees(camera.fov)))
     SubElement(sensor, "float", name="near_clip", value="0.01")
     transform = SubElement(sensor, "transform", name="to_world")
-    position, target = (", ".join(_number(c) for c in p) for p in (camera.position, camera.target))
-    SubElement(transform, "lookat", origin=position, target=target, up="0, 0, 1")
+    up = PinholeCamera(camera.position, camera.target, camera.fov).up
+    places = {"origin": camera.position, "target": camera.target, "up": up}
+    SubElement(transform, "lookat", {name: ", ".join(map(_number, p)) for name, p in places.items()})
     film = SubElement(sensor, "film", type="hdrfilm")
     SubElement(film, "integer", name="width", value=str(resolution[0]))
     SubElement(film, "integer", name="height", value=str(resolution[1]))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from gibench.generators.parts import Camera, FloatArray
 from gibench.generators.visibility import RayCaster
+from gibench.rendering.camera import PinholeCamera
 
 GRID = (24, 18)  # rays across and down, at the aspect of the usual 4:3 frame
 
@@ -33,17 +34,14 @@ class View:
 
 def camera_rays(cameras: Sequence[Camera], grid: tuple[int, int] = GRID) -> FloatArray:
     """(cameras, columns · rows, 3) unit directions through a grid over each view, row by row from the top."""
-    forward = np.array([np.subtract(camera.target, camera.position) for camera in cameras])
-    forward /= np.linalg.norm(forward, axis=1, keepdims=True)
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right, axis=1, keepdims=True)
-    up = np.cross(right, forward)
+    frames = np.array([PinholeCamera(c.position, c.target, c.fov).frame for c in cameras])
+    right, down, forward = frames[:, 0], frames[:, 1], frames[:, 2]
     columns, rows = grid
     reach = np.tan(np.array([camera.fov for camera in cameras]) / 2)[:, None]
     x = ((np.arange(columns) + 0.5) / columns * 2 - 1) * reach
-    y = (1 - (np.arange(rows) + 0.5) / rows * 2) * reach * rows / columns
+    y = ((np.arange(rows) + 0.5) / rows * 2 - 1) * reach * rows / columns
     across = x[:, None, :, None] * right[:, None, None]
-    rays = forward[:, None, None] + y[:, :, None, None] * up[:, None, None] + across
+    rays = forward[:, None, None] + y[:, :, None, None] * down[:, None, None] + across
     # In a frame of unit vectors the length follows from where a ray meets the image plane.
     rays /= np.sqrt(1 + x[:, None, :] ** 2 + y[:, :, None] ** 2)[..., None]
     return rays.reshape(len(cameras), -1, 3)

@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 from gibench.errors import GibenchError
 from gibench.rendering.backend import is_scalar
 
+NEAREST_TARGET = 1e-9
+"""Metres: a target that is no farther away gives no direction."""
+
 
 class CameraError(GibenchError, ValueError):
     """A camera that sees nothing, or a resolution that is none."""
@@ -28,9 +31,13 @@ class PinholeCamera:
     fov: float
 
     def __post_init__(self) -> None:
-        """Raises CameraError for what is no camera."""
+        """Raises CameraError for what is no camera. Numbers of NumPy become Python's, which alone Mitsuba takes."""
+        for name in ("position", "target"):
+            object.__setattr__(self, name, tuple(float(c) for c in getattr(self, name)))
+        object.__setattr__(self, "fov", float(self.fov))
         finite = np.isfinite([*self.position, *self.target, self.fov]).all()
-        if not finite or not 0 < self.fov < np.pi or np.allclose(self.position, self.target, atol=1e-9):
+        apart = np.linalg.norm(np.subtract(self.target, self.position)) > NEAREST_TARGET if finite else False
+        if not (apart and 0 < self.fov < np.pi):
             raise CameraError(
                 f"camera at {self.position} towards {self.target} with a field of view of {self.fov} rad: position "
                 "and target must be finite and apart, the field of view between 0 and pi"
@@ -48,6 +55,12 @@ class PinholeCamera:
         length = np.linalg.norm(right)
         right = right / length if length > 1e-7 else np.array([1.0, 0.0, 0.0])
         return np.array([right, np.cross(forward, right), forward])
+
+    @property
+    def up(self) -> tuple[float, float, float]:
+        """What a look-at transform takes as up: Z, or the top of the image where the view is along Z or next to it."""
+        x, y, z = -self.frame[1]
+        return (0.0, 0.0, 1.0) if z > 1e-3 else (float(x), float(y), float(z))
 
     def focal_length(self, width: int) -> float:
         """In pixels."""

@@ -18,7 +18,7 @@ from gibench.rendering import surface
 from gibench.rendering.backend import is_scalar
 from gibench.rendering.camera import PinholeCamera, RayGenerator
 from gibench.rendering.channels import CHANNELS, SETS
-from gibench.rendering.integrator import bsdf_at
+from gibench.rendering.integrator import bsdf_at, shading_normal
 from gibench.rendering.scene import Scene
 
 VISIBILITY_TOLERANCE = 1e-3
@@ -58,7 +58,7 @@ class _Hit:
 
     @property
     def normal(self) -> Any:
-        return self.facing(self.si.sh_frame.n)
+        return self.facing(shading_normal(self.si))
 
     def mirrored(self) -> _Hit:
         """The hit of the mirror ray."""

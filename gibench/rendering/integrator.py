@@ -84,6 +84,11 @@ def bsdf_at(si, ray):
     return _black() if is_scalar() and not si.is_valid() else si.bsdf(ray)
 
 
+def shading_normal(si):
+    """On the side of the geometric normal, also where a mesh brings normals that contradict its winding."""
+    return dr.mulsign(si.sh_frame.n, dr.dot(si.sh_frame.n, si.n))
+
+
 def _emission(scene, si, active):
     emitter = si.emitter(scene)
     # None only in the scalar variant, where an array of pointers would hold a null.
@@ -279,5 +284,5 @@ def trace_paths(
     if guides:
         # On a conductor this is a value of its lobe and may exceed 1; the denoiser wants [0, 1].
         result.albedo = dr.select(si.is_valid(), dr.clip(bsdf.eval_diffuse_reflectance(si), 0, 1), 0)
-        result.normal = dr.select(si.is_valid(), dr.mulsign(si.sh_frame.n, dr.dot(si.n, -ray.d)), 0)
+        result.normal = dr.select(si.is_valid(), dr.mulsign(shading_normal(si), dr.dot(si.n, -ray.d)), 0)
     return result

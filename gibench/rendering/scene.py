@@ -20,7 +20,7 @@ OPENINGS = "openings.json"
 
 
 class SceneError(GibenchError):
-    """A scene file that is not there or that Mitsuba refuses."""
+    """A scene file that is not there or that Mitsuba refuses, or a scene with a shape that cannot be rendered."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,10 +93,27 @@ def _key(pointer_type: Any, thing: Any) -> int:
     return int(dr.reinterpret_array(mi.UInt32, pointer_type(thing))[0])
 
 
+def _check(shape: Any) -> None:
+    """Raise SceneError for a mesh without triangles, and for a lamp without area, which would shine in vain."""
+    if shape.is_mesh() and shape.face_count() == 0:
+        raise SceneError(f"the mesh {shape.id()!r} has no triangles: remove it")
+    if shape.is_emitter():
+        area = float(np.array(shape.surface_area()).item())
+        if not (np.isfinite(area) and area > 0):
+            raise SceneError(
+                f"the light {shape.id()!r} has an area of {area:g} m²: give it a size or remove it"
+            )
+
+
 def wrap(mi_scene: Any) -> Scene:
-    """The handle of a `mitsuba.Scene` that already exists, made under the current variant."""
+    """The handle of a `mitsuba.Scene` that already exists, made under the current variant.
+
+    Raises SceneError for a mesh without triangles or a light without area.
+    """
     import mitsuba as mi
 
+    for shape in mi_scene.shapes():
+        _check(shape)
     materials: list[str] = []
     material_of: dict[int, int] = {}
     shapes: list[str] = []
@@ -128,7 +145,7 @@ def load_scene(path: str | Path, *, share_kernels: bool = False) -> Scene:
     share_kernels: for one of many rooms, so that the next need not be compiled again; see `kernel_sharing`. A file
     OPENINGS beside it says where daylight enters; without it the same image takes more samples.
 
-    Raises SceneError where the file is missing or Mitsuba refuses it, with its reason.
+    Raises SceneError where the file is missing or Mitsuba refuses it, with its reason, and as `wrap` does.
     """
     select_variant()
     import mitsuba as mi

@@ -42,6 +42,15 @@ def test_rays_span_the_field_of_view():
     assert grid[0, 200, 2] / grid[0, 200, 0] == pytest.approx(0.75, abs=0.01)
 
 
+@pytest.mark.parametrize("towards", [-1, 1])
+def test_a_view_along_z_has_rays_and_a_verdict(towards):
+    along = Camera((0, 0, 1), (0, 0, 1 + towards), math.radians(90))
+    rays = camera_rays([along])[0]
+    np.testing.assert_allclose(np.linalg.norm(rays, axis=1), 1)
+    assert (rays[:, 2] * towards > 0).all()
+    assert judge(Scripted(*good_view()), [along], 2)[0].reason == ""
+
+
 def test_a_good_view_passes():
     view = judge(Scripted(*good_view()), [EAST], 2)[0]
     assert view.reason == ""

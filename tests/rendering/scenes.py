@@ -7,17 +7,13 @@ from typing import Any
 import numpy as np
 
 from gibench.rendering.camera import PinholeCamera
+from gibench.stress import views
+from gibench.stress.scenes import area, closed_box, rectangle, rgb, two_sided
+
+__all__ = ["area", "closed_box", "rectangle", "rgb", "two_sided"]
 
 CAMERA = PinholeCamera((0.0, -3.4, 1.0), (0.0, 0.0, 0.95), np.radians(45.0))
 """Looks into `box` from its open side."""
-
-
-def rgb(*value: float) -> dict[str, Any]:
-    return {"type": "rgb", "value": list(value) if len(value) > 1 else [value[0]] * 3}
-
-
-def two_sided(**bsdf: Any) -> dict[str, Any]:
-    return {"type": "twosided", "inside": bsdf}
 
 
 def checker() -> dict[str, Any]:
@@ -40,27 +36,6 @@ MATERIALS: dict[str, dict[str, Any]] = {
     "metal": two_sided(type="roughconductor", material="Cu", alpha=0.2, distribution="ggx"),
     "mirror": two_sided(type="conductor", material="Al", specular_reflectance=rgb(0.9)),
 }
-
-
-def _look(origin: list[float], target: list[float], up: list[float]) -> Any:
-    import mitsuba as mi
-
-    return mi.ScalarTransform4f().look_at(origin=origin, target=target, up=up)
-
-
-def rectangle(
-    centre: list[float], normal: list[float], half: tuple[float, float], **more: Any
-) -> dict[str, Any]:
-    import mitsuba as mi
-
-    up = [0.0, 1.0, 0.0] if abs(normal[2]) > 0.5 else [0.0, 0.0, 1.0]
-    target = [c + n for c, n in zip(centre, normal, strict=True)]
-    shape = _look(centre, target, up) @ mi.ScalarTransform4f().scale([half[0], half[1], 1])
-    return {"type": "rectangle", "to_world": shape, **more}
-
-
-def area(*radiance: float) -> dict[str, Any]:
-    return {"type": "area", "radiance": rgb(*radiance)}
 
 
 def box(material: str) -> dict[str, Any]:
@@ -102,46 +77,9 @@ def furnace(bsdf: dict[str, Any], radiance: float = 1.0) -> dict[str, Any]:
     }
 
 
-def closed_box(reflectance: float, emitted: float) -> dict[str, Any]:
-    """A cube of 2 m around the origin whose six walls emit `emitted` and reflect `reflectance`."""
-    walls = {
-        f"wall{axis}{side}": rectangle(
-            [side if a == axis else 0 for a in range(3)],
-            [-side if a == axis else 0 for a in range(3)],
-            (1, 1),
-            bsdf={"type": "diffuse", "reflectance": rgb(reflectance)},
-            emitter=area(emitted),
-        )
-        for axis in range(3)
-        for side in (-1, 1)
-    }
-    return {"type": "scene", **walls}
-
-
 def render_path(mi_scene: Any, camera: PinholeCamera, side: int, spp: int, seed: int, max_depth: int) -> Any:
-    """Mitsuba's own `path` through a box filter, (side, side, 3); max_depth counts scattering events."""
-    import mitsuba as mi
-
+    """Mitsuba's own `path` with the same Russian roulette, so that the two also compare by time."""
     from gibench.rendering.integrator import RR_DEPTH
 
-    sensor = mi.load_dict(
-        {
-            "type": "perspective",
-            "fov": float(np.degrees(camera.fov)),
-            "fov_axis": "x",
-            "near_clip": 1e-4,
-            "to_world": _look(list(camera.position), list(camera.target), [0, 0, 1]),
-            "film": {
-                "type": "hdrfilm",
-                "width": side,
-                "height": side,
-                "rfilter": {"type": "box"},
-                "pixel_format": "rgb",
-                "component_format": "float32",
-            },
-            "sampler": {"type": "independent"},
-        }
-    )
-    # The same Russian roulette, so that the two also compare by time.
-    integrator = mi.load_dict({"type": "path", "max_depth": max_depth + 1, "rr_depth": RR_DEPTH})
-    return np.array(mi.render(mi_scene, sensor=sensor, integrator=integrator, spp=spp, seed=seed))
+    options = {"spp": spp, "seed": seed, "max_depth": max_depth, "rr_depth": RR_DEPTH}
+    return views.render_path(mi_scene, camera, (side, side), **options)

@@ -7,6 +7,7 @@ import pytest
 
 from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.channels import CHANNELS
+from gibench.rendering.estimate import estimate_radiance
 from gibench.rendering.render import render_frame
 from gibench.rendering.scene import load_dict
 
@@ -210,3 +211,25 @@ def test_only_what_is_asked_for_comes_back():
     assert list(frame) == ["depth", "reflected_albedo"]
     for name, values in frame.items():
         assert values.shape == (33, 33, CHANNELS[name].components)
+
+
+def test_normals_that_contradict_the_winding_face_the_viewer():
+    import mitsuba as mi
+
+    shape = mi.Mesh("floor", 4, 2, has_vertex_normals=True)
+    parameters = mi.traverse(shape)
+    parameters["vertex_positions"] = [-1, -1, 0, 1, -1, 0, 1, 1, 0, -1, 1, 0]
+    parameters["faces"] = [0, 1, 2, 0, 2, 3]
+    tilted = np.array([0.1, 0, -1]) / np.linalg.norm([0.1, 0, -1])
+    parameters["vertex_normals"] = np.tile(tilted, 4).astype(np.float32)
+    parameters.update()
+    scene = load_dict({"type": "scene", "floor": shape, "light": {"type": "constant"}})
+    for height in (1, -1):
+        camera = PinholeCamera((0, -1, height), (0, 0, 0), 0.1)
+        frame = render_frame(scene, camera, resolution=(4, 4), channels=["surface", "reflection"]).arrays
+        # The same line as the mesh gives, on the viewer's side.
+        np.testing.assert_allclose(frame["normal"], np.broadcast_to(-height * tilted, (4, 4, 3)), atol=1e-6)
+        np.testing.assert_allclose(frame["geometric_normal"][0, 0], [0, 0, height], atol=1e-6)
+        assert not frame["reflected_distance"].any()
+        estimate = estimate_radiance(scene, camera, (4, 4), spp=4, guides=True)
+        np.testing.assert_allclose(estimate.part("normal"), frame["normal"].reshape(-1, 3), atol=1e-5)

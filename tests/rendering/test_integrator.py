@@ -9,6 +9,7 @@ from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.channels import PARTS
 from gibench.rendering.render import render_frame
 from gibench.rendering.scene import load_dict
+from gibench.stress.answers import parallel_rectangle
 
 from . import scenes
 
@@ -131,21 +132,13 @@ def test_closed_box(reflectance):
         assert ratio == pytest.approx(truncated, rel=0.01)
 
 
-def irradiance_of_parallel_rectangle(half_x, half_y, height, radiance):
-    """At the foot of its centre: four corners of the form factor of a parallel rectangle (Howell, B-3)."""
-    x, y = half_x / height, half_y / height
-    a, b = np.sqrt(1 + x * x), np.sqrt(1 + y * y)
-    corner = (x / a * np.arctan(y / a) + y / b * np.arctan(x / b)) / (2 * np.pi)
-    return np.pi * radiance * 4 * corner
-
-
 @pytest.mark.parametrize("shape", ["rectangle", "sphere"])
 def test_irradiance_under_a_light(shape):
     """A diffuse floor under one light reflects ρ/π of the analytic irradiance."""
     reflectance, radiance = 0.5, 3.0
     if shape == "rectangle":
         light = scenes.rectangle([0, 0, 1.5], [0, 0, -1], (0.4, 0.7), emitter=scenes.area(radiance))
-        irradiance = irradiance_of_parallel_rectangle(0.4, 0.7, 1.5, radiance)
+        irradiance = np.pi * radiance * parallel_rectangle(0.4, 0.7, 1.5)
     else:
         light = {"type": "sphere", "center": [0, 0, 1.5], "radius": 0.3, "emitter": scenes.area(radiance)}
         irradiance = np.pi * radiance * (0.3 / 1.5) ** 2

@@ -22,7 +22,7 @@ from gibench.rendering.backend import is_scalar
 from gibench.rendering.render import MAX_DEPTH
 from gibench.rendering.scene import Scene
 
-VERSION = 1
+VERSION = 2
 """Of what is baked; raise it when the texels change."""
 
 SEED = 0

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from gibench.baselines.lightmap.texel_paths import diffuse_context
 from gibench.baselines.lightmap.unwrapping import NONE, LightmapError
+from gibench.datasets.exr import DARK, fits_half
 from gibench.rendering.scene import Scene
 
 ATLAS, CORNERS, OFFSETS = "atlas.exr", "corners.npy", "offsets.npy"
@@ -86,10 +87,12 @@ class Lightmap:
 def write_lightmap(
     folder: Path, atlas: NDArray[np.float32], corners: NDArray[np.float32], offsets: NDArray[np.uint32]
 ) -> None:
-    """Files that `read_lightmap` reads; the atlas as half floats, which any EXR viewer shows."""
-    half = np.minimum(atlas, np.finfo(np.float16).max).astype(np.float16)
+    """Files that `read_lightmap` reads; the atlas as half floats where they can hold it, else in single precision."""
+    lit = atlas[atlas > 0]
+    half = fits_half(atlas, dark=DARK * float(np.median(lit))) if lit.size else True
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    OpenEXR.File(header, {"RGB": half}).write(str(folder / ATLAS))
+    pixels = np.ascontiguousarray(atlas, dtype=np.float16 if half else np.float32)
+    OpenEXR.File(header, {"RGB": pixels}).write(str(folder / ATLAS))
     np.save(folder / CORNERS, corners)
     np.save(folder / OFFSETS, offsets)
 

@@ -14,7 +14,17 @@ import drjit as dr
 import mitsuba as mi
 
 POLE = 1e-12
-"""Squared sine of the elevation's complement below which a direction is the pole itself and any azimuth will do."""
+"""Squared distance from the axis, of a direction whose largest component is 1, below which it is the pole itself and
+any azimuth will do."""
+
+SMALLEST = 1.2e-38
+"""The smallest normal float32."""
+
+
+def _scaled(direction: Any) -> Any:
+    """A direction of any length with a largest component of 1; 0, which leads from a probe to itself, stays 0."""
+    largest = dr.maximum(dr.abs(direction.x), dr.maximum(dr.abs(direction.y), dr.abs(direction.z)))
+    return direction / dr.maximum(largest, SMALLEST)
 
 
 @dataclass(frozen=True)
@@ -30,8 +40,8 @@ class LatLong:
     name = "lat-long"
 
     def coordinates(self, direction: Any) -> Any:
-        """mi.Point2f texel coordinates in [0, width] × [0, height] of a direction, which need not have unit length."""
-        d = dr.normalize(direction)
+        """mi.Point2f texel coordinates in [0, width] × [0, height] of a direction of any length; 0 is the pole."""
+        d = _scaled(direction)
         flat = dr.square(d.x) + dr.square(d.y)
         azimuth = dr.select(flat > POLE, dr.atan2(d.y, d.x), 0)
         # The polar angle from both parts: acos alone is off by 3e-4 next to a pole.
@@ -73,8 +83,9 @@ class Octahedral:
     name = "octahedral"
 
     def coordinates(self, direction: Any) -> Any:
-        """mi.Point2f texel coordinates in [0, width] × [0, height] of a direction of any length."""
-        d = direction / (dr.abs(direction.x) + dr.abs(direction.y) + dr.abs(direction.z))
+        """mi.Point2f texel coordinates in [0, width] × [0, height] of a direction of any length; 0 is +Z."""
+        d = _scaled(direction)
+        d /= dr.maximum(dr.abs(d.x) + dr.abs(d.y) + dr.abs(d.z), SMALLEST)
         fold = mi.Point2f(
             dr.copysign(1 - dr.abs(d.y), d.x),
             dr.copysign(1 - dr.abs(d.x), d.y),

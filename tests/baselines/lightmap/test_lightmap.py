@@ -5,7 +5,7 @@ import pytest
 
 from gibench.baselines import lightmap
 from gibench.baselines.lightmap.bake import baked_lightmap
-from gibench.baselines.lightmap.lookup import ATLAS, CORNERS, read_lightmap
+from gibench.baselines.lightmap.lookup import ATLAS, CORNERS, read_lightmap, write_lightmap
 from gibench.baselines.lightmap.unwrapping import LightmapError
 from gibench.baselines.stages import Stages
 from gibench.generators.rooms import sample_room
@@ -47,6 +47,20 @@ def test_agrees_with_the_path_tracer_where_all_is_diffuse(tmp_path):
     # Edges of shadows are as soft as a texel.
     assert np.sqrt(np.mean(np.minimum(error, 1) ** 2)) < 0.06
     assert list(stages.seconds) == ["g-buffer"]
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "dtype"), [(0.2, 30.0, np.float16), (0.2, 1e6, np.float32), (1e-7, 1e-6, np.float32)]
+)
+def test_the_file_keeps_what_half_floats_cannot(tmp_path, low, high, dtype):
+    import OpenEXR
+
+    atlas = np.random.default_rng(0).uniform(low, high, (16, 16, 3)).astype(np.float32)
+    atlas[:4] = 0
+    write_lightmap(tmp_path, atlas, np.zeros((1, 3, 2), np.float32), np.zeros(2, np.uint32))
+    stored = OpenEXR.File(str(tmp_path / ATLAS)).channels()["RGB"].pixels
+    assert stored.dtype == dtype
+    np.testing.assert_allclose(stored, atlas, rtol=1e-3)
 
 
 def test_agrees_with_the_path_tracer_in_a_furnished_room(tmp_path):

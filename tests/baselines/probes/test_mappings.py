@@ -131,3 +131,13 @@ def test_wrapping_leaves_the_inside_alone():
         np.testing.assert_array_equal(np.array(x), column)
         np.testing.assert_array_equal(np.array(y), row)
     assert dr.width(x) == MAPS[-1].width * MAPS[-1].height
+
+
+@pytest.mark.parametrize("mapping", MAPS, ids=name)
+def test_no_direction_and_tiny_ones_have_a_texel(mapping):
+    tiny = np.array([[0, 0, 0], [0, 0, 1e-38], [1e-30, 0, 0], [-1e-25, 1e-25, -1e-25], [0, 1e30, 1e30]])
+    at = columns(mapping.coordinates(vectors(tiny)))
+    assert np.isfinite(at).all()
+    assert ((at >= 0) & (at <= [mapping.width, mapping.height])).all()
+    unit = np.array([[0, 0, 1], [0, 0, 1], [1, 0, 0], [-1, 1, -1], [0, 1, 1]])
+    np.testing.assert_allclose(at, columns(mapping.coordinates(vectors(unit))), atol=1e-4 * mapping.width)
