@@ -7,6 +7,7 @@ published is what was rendered.
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
@@ -96,7 +97,7 @@ def scene_element(
     integrator = SubElement(scene, "integrator", type="path")
     SubElement(integrator, "integer", name="max_depth", value=str(max_depth))
     for number, camera in enumerate(room.cameras):
-        scene.append(_sensor(camera, f"camera.{number}", resolution, spp))
+        scene.append(sensor_element(camera, f"camera.{number}", resolution, spp))
     for material in room.materials.values():
         textured = isinstance(material.reflectance, Texture)
         scene.append(bsdf_xml(material, f"textures/{material.name}.png" if textured else None))
@@ -120,7 +121,8 @@ def _number(value: float) -> str:
     return repr(float(value))
 
 
-def _sensor(camera: Camera, name: str, resolution: tuple[int, int], spp: int) -> Element:
+def sensor_element(camera: Camera, name: str, resolution: tuple[int, int], spp: int) -> Element:
+    """The `<sensor>` of a camera. resolution: (width, height) of its film."""
     sensor = Element("sensor", type="perspective", id=name)
     SubElement(sensor, "string", name="fov_axis", value="x")
     SubElement(sensor, "float", name="fov", value=_number(np.degrees(camera.fov)))
@@ -198,18 +200,23 @@ def describe(room: Room) -> dict[str, Any]:
             }
             for name, material in room.materials.items()
         },
-        "cameras": [
-            {
-                "position": _plain(camera.position),
-                "target": _plain(camera.target),
-                "fov": float(camera.fov),
-                "path": camera.path,
-                "step": int(camera.step),
-            }
-            for camera in room.cameras
-        ],
+        "cameras": camera_records(room.cameras),
         "rejections": dict(sorted(room.rejections.items())),
     }
+
+
+def camera_records(cameras: Sequence[Camera]) -> list[dict[str, Any]]:
+    """What room.json says of cameras."""
+    return [
+        {
+            "position": _plain(camera.position),
+            "target": _plain(camera.target),
+            "fov": float(camera.fov),
+            "path": camera.path,
+            "step": int(camera.step),
+        }
+        for camera in cameras
+    ]
 
 
 def _plain(value: Any) -> Any:

@@ -1,0 +1,79 @@
+"""Shapes that turn their back to the room, turned round.
+
+Modellers rarely care which side of a wall is its front, and a material for both sides hides it. Methods do care: what
+sees back faces is inside of something solid. Whether a shape is the wrong way round shows from the free space of the
+room, from where of a shape that is right no back is seen.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gibench.generators.imported.reading import Node, new
+from gibench.generators.imported.scene import ImportedScene
+from gibench.generators.imported.upgrading import Change
+from gibench.rendering.free_space import NoFreeSpace, free_space, sphere
+from gibench.rendering.scene import Scene
+
+POINTS, RAYS = 1024, 64
+LEAST_HITS = 8
+MOST_FRONT = 0.1
+"""Share of hits on its front below which a shape is the wrong way round; for shapes in doubt it is near one half."""
+
+ONE_SIDED = (
+    "dielectric",
+    "roughdielectric",
+    "thindielectric",
+    "null",
+    "principled",
+    "principledthin",
+    "hair",
+)
+"""Materials to which it matters which side they are seen from."""
+
+
+def turned_round(scene: ImportedScene) -> ImportedScene:
+    """The scene with its shapes facing the room, where that changes nothing of the image."""
+    by_id = {node.get("id", ""): node for node in scene.tree.root.everything() if node.tag != "ref"}
+    turned = []
+    for name in inverted(scene.loaded):
+        node = by_id[name]
+        if not _is_two_sided(node, by_id):
+            continue
+        flag = node.property("flip_normals")
+        if flag is None:
+            node.append(new("boolean", node, name="flip_normals", value="true"))
+        else:
+            flag.set("value", "false" if flag.get("value") == "true" else "true")
+        turned.append(
+            Change("orientation", "a shape that turned its back to the room is turned round", node.where)
+        )
+    return scene.changed(turned) if turned else scene
+
+
+def inverted(scene: Scene) -> list[str]:
+    """Ids of the shapes of which the free space sees backs. Needs a vectorised variant."""
+    from gibench.generators.imported.survey import hits
+
+    try:
+        found = free_space(scene)
+    except NoFreeSpace:
+        return []
+    points = found[np.random.default_rng(2).permutation(len(found))[:POINTS]]
+    directions = np.tile(sphere(RAYS), (len(points), 1))
+    _, shape, normal = hits(scene, np.repeat(points, RAYS, axis=0), directions)
+    front = np.einsum("rc,rc->r", normal, directions) < 0
+    count = np.bincount(shape, minlength=len(scene.shapes) + 1)
+    fronts = np.bincount(shape, weights=front, minlength=len(scene.shapes) + 1)
+    wrong = (count >= LEAST_HITS) & (fronts < MOST_FRONT * count)
+    return [scene.shapes[number - 1] for number in np.flatnonzero(wrong) if number > 0]
+
+
+def _is_two_sided(shape: Node, by_id: dict[str, Node]) -> bool:
+    if shape.nodes("emitter"):
+        return False
+    bsdfs = shape.nodes("bsdf") + [
+        by_id[ref.get("id", "")] for ref in shape.nodes("ref") if by_id[ref.get("id", "")].tag == "bsdf"
+    ]
+    parts = [part.type for bsdf in bsdfs for part in bsdf.everything() if part.tag == "bsdf"]
+    return "twosided" in parts and not any(part in ONE_SIDED for part in parts)
