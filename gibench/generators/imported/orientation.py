@@ -11,8 +11,10 @@ import numpy as np
 
 from gibench.generators.imported.reading import Node, new
 from gibench.generators.imported.scene import ImportedScene
+from gibench.generators.imported.survey import hits
 from gibench.generators.imported.upgrading import Change
-from gibench.rendering.free_space import NoFreeSpace, free_space, sphere
+from gibench.generators.parts import FloatArray
+from gibench.rendering.free_space import sphere
 from gibench.rendering.scene import Scene
 
 POINTS, RAYS = 1024, 64
@@ -32,11 +34,14 @@ ONE_SIDED = (
 """Materials to which it matters which side they are seen from."""
 
 
-def turned_round(scene: ImportedScene) -> ImportedScene:
-    """The scene with its shapes facing the room, where that changes nothing of the image."""
+def turned_round(scene: ImportedScene, found: FloatArray) -> ImportedScene:
+    """The scene with its shapes facing the room, where that changes nothing of the image.
+
+    found: (N, 3) points of its free space. Returns the scene itself where nothing was wrong.
+    """
     by_id = {node.get("id", ""): node for node in scene.tree.root.everything() if node.tag != "ref"}
     turned = []
-    for name in inverted(scene.loaded):
+    for name in inverted(scene.loaded, found):
         node = by_id[name]
         if not _is_two_sided(node, by_id):
             continue
@@ -51,14 +56,8 @@ def turned_round(scene: ImportedScene) -> ImportedScene:
     return scene.changed(turned) if turned else scene
 
 
-def inverted(scene: Scene) -> list[str]:
-    """Ids of the shapes of which the free space sees backs. Needs a vectorised variant."""
-    from gibench.generators.imported.survey import hits
-
-    try:
-        found = free_space(scene)
-    except NoFreeSpace:
-        return []
+def inverted(scene: Scene, found: FloatArray) -> list[str]:
+    """Ids of the shapes of which the points (N, 3) see backs. Needs a vectorised variant."""
     points = found[np.random.default_rng(2).permutation(len(found))[:POINTS]]
     directions = np.tile(sphere(RAYS), (len(points), 1))
     _, shape, normal = hits(scene, np.repeat(points, RAYS, axis=0), directions)

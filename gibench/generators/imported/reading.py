@@ -64,14 +64,15 @@ def new(tag: str, like: Node, **attributes: str) -> Node:
 class SceneTree:
     """A scene file with everything that it includes.
 
-    root: its `<scene>`. file: where it came from. folder: what file names count from. allow_outside: whether files may
-    lie outside of it.
+    root: its `<scene>`. file: where it came from. allow_outside: whether files may lie outside its folder. searched:
+    more folders that files are looked for in. made: files that were made during the import, by name.
     """
 
     root: Node
     file: Path
     allow_outside: bool = False
     searched: list[Path] = field(default_factory=list)
+    made: dict[str, Path] = field(default_factory=dict)
 
     @property
     def folder(self) -> Path:
@@ -83,6 +84,8 @@ class SceneTree:
 
         Raises SceneFileError where that is outside the scene's folder and not allowed.
         """
+        if name in self.made:
+            return self.made[name]
         # Windows' separators are common in old scenes; no file of such a scene has one in its name.
         name = name.strip().replace("\\", "/")
         candidates = [folder / name for folder in (self.folder, *self.searched)]

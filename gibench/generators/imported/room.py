@@ -19,8 +19,9 @@ from gibench.generators.imported.glb import write_scene_glb
 from gibench.generators.imported.placing import placed_matrix
 from gibench.generators.imported.reading import Node
 from gibench.generators.imported.scene import ImportedScene
-from gibench.generators.parts import Camera
+from gibench.generators.parts import Camera, FloatArray
 from gibench.generators.scene_files import camera_records, sensor_element
+from gibench.rendering.scene import OPENINGS
 
 STILLS, PATH = 3000, 3001
 """Lanes of the random numbers, far from those of generated rooms."""
@@ -30,13 +31,15 @@ STILLS, PATH = 3000, 3001
 class ImportedRoom:
     """A scene with its cameras: its own first, then stills, then those on a path.
 
-    index: number in its dataset. kind: name of the scene. rejections: reason → count, of views.
+    index: number in its dataset. openings: (N, 3, 3) rectangles that daylight enters by, None where they are not known.
+    rejections: reason → count, of views.
     """
 
     seed: int
     index: int
     scene: ImportedScene
     cameras: tuple[Camera, ...]
+    openings: FloatArray | None = None
     rejections: Mapping[str, int] = field(default_factory=dict)
 
     @property
@@ -62,9 +65,20 @@ def import_room(
 
     Raises SceneFileError where no view passes the checks, or where there is none at all.
     """
-    from gibench.generators.imported.orientation import turned_round  # brings the renderer
+    # These bring the renderer.
+    from gibench.generators.imported.openings import find_openings
+    from gibench.generators.imported.orientation import turned_round
+    from gibench.rendering.free_space import NoFreeSpace, free_space
 
-    scene = turned_round(scene)
+    found, why_none = np.zeros((0, 3)), ""
+    try:
+        found = free_space(scene.loaded)
+        turned = turned_round(scene, found)
+        if turned is not scene:
+            scene, found = turned, free_space(turned.loaded)
+    except NoFreeSpace as problem:
+        why_none = str(problem)
+    openings = find_openings(scene.loaded, found) if len(found) else None
     cameras = [camera.at(resolution) for camera in scene.cameras]
     rejections: Counter[str] = Counter()
     stills = views if path is None or path_views else 0
@@ -72,7 +86,11 @@ def import_room(
     if stills or on_path:
         from gibench.generators.imported.survey import survey
 
-        stage = survey(scene.loaded)
+        if not len(found):
+            raise SceneFileError(
+                f"{scene.tree.file}: no place for a camera: {why_none}; give cameras with --cameras"
+            )
+        stage = survey(scene.loaded, found)
         try:
             if stills:
                 drawn, refused = sample_stills(_rng(seed, STILLS), stage, stills)
@@ -93,7 +111,7 @@ def import_room(
         raise SceneFileError(
             f"{scene.tree.file}: the scene has no camera of its own: ask for some with --views"
         )
-    return ImportedRoom(seed, index, scene, tuple(cameras), dict(rejections))
+    return ImportedRoom(seed, index, scene, tuple(cameras), openings, dict(rejections))
 
 
 def _rng(seed: int, lane: int) -> np.random.Generator:
@@ -103,7 +121,7 @@ def _rng(seed: int, lane: int) -> np.random.Generator:
 def write_imported_room(
     room: ImportedRoom, folder: str | Path, *, max_depth: int, resolution: tuple[int, int], spp: int
 ) -> None:
-    """Write scene.xml, meshes/, textures/, room.glb and room.json, as `scene_files.write_room` does."""
+    """Write scene.xml, meshes/, textures/, openings.json, room.glb and room.json, as `scene_files.write_room` does."""
     folder = Path(folder)
     for name in ("meshes", "textures"):
         (folder / name).mkdir(parents=True, exist_ok=True)
@@ -116,6 +134,8 @@ def write_imported_room(
     indent(element, "  ")
     ElementTree(element).write(folder / "scene.xml", encoding="utf-8", xml_declaration=True)
     write_scene_glb(room.scene, folder / "room.glb")
+    if room.openings is not None:
+        (folder / OPENINGS).write_text(json.dumps(room.openings.tolist()) + "\n", encoding="utf-8")
     text = json.dumps(describe(room), indent=1, allow_nan=False, ensure_ascii=False)
     (folder / "room.json").write_text(text + "\n", encoding="utf-8")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import tempfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -10,13 +11,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.etree.ElementTree import tostring
 
+from gibench.generators.imported.channels import single_channels
 from gibench.generators.imported.errors import SceneFileError
 from gibench.generators.imported.files import destinations, named_files, settle_missing
 from gibench.generators.imported.own_cameras import GivenCamera, cameras_of, read_camera_file
 from gibench.generators.imported.placing import place, placed_matrix, up_axis
 from gibench.generators.imported.reading import Node, SceneTree, read_tree
 from gibench.generators.imported.shapes import check_references, expand_instances, name_everything
-from gibench.generators.imported.upgrading import Change, upgrade
+from gibench.generators.imported.upgrading import Change, is_legacy, upgrade
 
 if TYPE_CHECKING:
     from gibench.rendering.scene import Scene
@@ -56,6 +58,7 @@ class ImportedScene:
     missing: tuple[str, ...]
     warnings: tuple[str, ...] = ()
     files: Mapping[Path, str] = field(default_factory=dict)
+    scratch: Any = None  # the folder of files that were made, which lives as long as the scene
 
     @cached_property
     def loaded(self) -> Scene:
@@ -82,7 +85,7 @@ class ImportedScene:
 
     def with_files(self, *, absolute: bool = False) -> Node:
         """A copy of the scene whose file names are absolute, or those of a room's folder."""
-        copy = SceneTree(_copied(self.tree.root), self.tree.file, self.tree.allow_outside, self.tree.searched)
+        copy = replace(self.tree, root=_copied(self.tree.root))
         for _, name, path in named_files(copy):
             name.set("value", str(path.resolve()) if absolute else self.files[path.resolve()])
         return copy.root
@@ -102,6 +105,7 @@ def import_scene(file: Path, settings: ImportSettings | None = None) -> Imported
     """
     settings = settings or ImportSettings()
     tree = read_tree(file, allow_outside=settings.allow_outside)
+    legacy = is_legacy(tree.root)
     changes = upgrade(tree)
 
     def note(rule: str) -> Any:
@@ -112,6 +116,8 @@ def import_scene(file: Path, settings: ImportSettings | None = None) -> Imported
 
     check_references(tree.root)
     missing = settle_missing(tree, allow_missing=settings.allow_missing)
+    scratch = tempfile.TemporaryDirectory(prefix="gibench-scene-")
+    single_channels(tree, Path(scratch.name), note("channels"), legacy=legacy)
     expand_instances(tree.root, note("instances"))
     name_everything(tree.root)
     if not tree.root.nodes("shape"):
@@ -138,6 +144,7 @@ def import_scene(file: Path, settings: ImportSettings | None = None) -> Imported
         missing=tuple(missing),
         warnings=tuple(warnings),
         files=destinations(tree),
+        scratch=scratch,
     )
 
 

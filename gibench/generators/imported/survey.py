@@ -12,14 +12,7 @@ from scipy import ndimage
 from gibench.generators.cameras import HEIGHTS, Stage
 from gibench.generators.imported.errors import SceneFileError
 from gibench.generators.parts import FloatArray
-from gibench.rendering.free_space import (
-    NoFreeSpace,
-    enclosed,
-    fan,
-    free_space,
-    seen_from,
-    surroundings,
-)
+from gibench.rendering.free_space import enclosed, fan, seen_from, surroundings
 from gibench.rendering.scene import Scene
 
 CELL = 0.1
@@ -85,15 +78,11 @@ def hits(scene: Scene, origins: FloatArray, directions: FloatArray) -> tuple[Any
     return np.array(si.t), np.array(shape).astype(np.int64), np.array(si.n).T
 
 
-def survey(scene: Scene) -> Stage:
+def survey(scene: Scene, found: FloatArray) -> Stage:
     """Find the floor, where on it a camera may stand, and what to look at. Needs a vectorised variant.
 
-    Raises SceneFileError where there is no room to stand in.
+    found: (N, 3) points of the free space. Raises SceneFileError where there is no room to stand in.
     """
-    try:
-        found = free_space(scene)
-    except NoFreeSpace as problem:
-        raise SceneFileError(f"no place for a camera: {problem}; give cameras with --cameras") from None
     floor = _floor(scene, found)
     free, height = _free_floor(scene, found, floor)
     low, high = np.percentile(found, [1, 99], axis=0)
