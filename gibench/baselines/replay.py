@@ -45,7 +45,7 @@ class Replay:
         held: arrays, or pytrees of them, that it reads besides and that stay as they are.
         """
         portals = arrays_of(scene.portals) if scene.portals is not None else {}
-        self._held = [scene.mi_scene, portals, scene._tables, _kinds(), held]
+        self._held = [scene.mi_scene, portals, scene._tables, scene.layers.arrays, _kinds(), held]
         self._function = function
         me = weakref.ref(self)  # `dr.freeze` makes cycles of its own, which would hold the scene
 

@@ -64,6 +64,14 @@ class Scene:
 
         return Portals(self.mi_scene, self.openings)
 
+    @cached_property
+    def layers(self) -> Any:
+        """`layers.Layers` of the materials."""
+        from gibench.rendering.layers import Layers
+
+        bsdfs = {id(bsdf): bsdf for shape in self.mi_scene.shapes() if (bsdf := shape.bsdf()) is not None}
+        return Layers(list(bsdfs.values()))
+
     def material_ids(self, bsdf: Any, active: Any) -> Any:
         """Ids (from 1) of an array of BSDF pointers; 0 where not `active`."""
         import drjit as dr
