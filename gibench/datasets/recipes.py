@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 #: Environments that are no file: what `sample_room` would choose itself, sun and sky, or darkness outside.
 ENVIRONMENTS = ("auto", "sunsky", "none")
 
+#: SPDX's way to say: that of the scenes, whose licence files lie beside them in the dataset.
+SCENE_LICENCE = "LicenseRef-of-the-scene"
+
 #: Options of the commands whose name is not the key that they override.
 OPTIONS = {
     "kinds": "--kind",
@@ -120,7 +123,8 @@ class Recipe(BaseModel):
     @classmethod
     def _a_room_a_scene(cls, values: Any) -> Any:
         if isinstance(values, dict) and isinstance(scenes := values.get("scenes"), list | tuple) and scenes:
-            return {**values, "rooms": len(scenes)}
+            # What is rendered of a scene stays under the terms of its author.
+            return {"licence": SCENE_LICENCE, **values, "rooms": len(scenes)}
         return values
 
     @model_validator(mode="after")
@@ -153,7 +157,8 @@ class Recipe(BaseModel):
                     )
             if self.views == 0:
                 raise PydanticCustomError(
-                    "scenes", "views is 0, but only scenes have cameras of their own: set views or scenes"
+                    "views",
+                    "0 is not allowed: only scenes have cameras of their own; allowed is an integer from 1",
                 )
         elif self.environment != "auto":
             raise PydanticCustomError(
@@ -324,6 +329,8 @@ def _message(
             source = "options"
         elif problem["type"] == "single" and "spp" in options:
             source = "--spp"
+        elif problem["type"] == "views":
+            source = _place("views", source, options)
         return f"{source}: {problem['msg']}"
     key = str(problem["loc"][0])
     if problem["type"] == "extra_forbidden":

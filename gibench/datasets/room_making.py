@@ -13,7 +13,7 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -121,14 +121,14 @@ def written_room(room: Room | ImportedRoom, folder: Path, recipe: Recipe) -> Non
         "resolution": recipe.resolution,
         "spp": recipe.spp or recipe.spp_cap,
     }
-    if isinstance(room, Room):
-        from gibench.generators.scene_files import write_room
-
-        write_room(room, folder, **settings)
-    else:
+    if recipe.scenes:
         from gibench.generators.imported.room import write_imported_room
 
-        write_imported_room(room, folder, **settings)
+        write_imported_room(cast("ImportedRoom", room), folder, **settings)
+    else:
+        from gibench.generators.scene_files import write_room
+
+        write_room(cast(Room, room), folder, **settings)
 
 
 def rendered_frame(
@@ -213,7 +213,7 @@ class RoomMaker:
             if path.is_file()
         }
         (folder / "frames").mkdir()
-        given = 0 if isinstance(room, Room) else len(room.scene.cameras)
+        given = given_cameras(recipe, number)
         frames: list[Future[dict[str, Any]]] = []
         # Compressing and writing a frame goes on while the next one renders. One frame at most waits for it,
         # so memory does not grow with the number of views.

@@ -31,7 +31,7 @@ STILLS, PATH = 3000, 3001
 class ImportedRoom:
     """A scene with its cameras: its own first, then stills, then those on a path.
 
-    index: number in its dataset. openings: (N, 3, 3) rectangles that daylight enters by, None where they are not known.
+    index: number in its dataset. openings: (N, 3, 3) rectangles that daylight enters by, as far as they were found.
     rejections: reason → count, of views.
     """
 
@@ -39,7 +39,7 @@ class ImportedRoom:
     index: int
     scene: ImportedScene
     cameras: tuple[Camera, ...]
-    openings: FloatArray | None = None
+    openings: FloatArray = field(default_factory=lambda: np.zeros((0, 3, 3)))
     rejections: Mapping[str, int] = field(default_factory=dict)
 
     @property
@@ -78,7 +78,7 @@ def import_room(
             scene, found = turned, free_space(turned.loaded)
     except NoFreeSpace as problem:
         why_none = str(problem)
-    openings = find_openings(scene.loaded, found) if len(found) else None
+    openings = find_openings(scene.loaded, found) if len(found) else np.zeros((0, 3, 3))
     cameras = [camera.at(resolution) for camera in scene.cameras]
     rejections: Counter[str] = Counter()
     stills = views if path is None or path_views else 0
@@ -130,11 +130,14 @@ def write_imported_room(
             shutil.copyfile(source, folder / name)
         except FileNotFoundError:
             raise SceneFileError(f"{source} was there when the scene was read, and is gone") from None
+    for terms in sorted(room.scene.tree.folder.glob("LICEN[CS]E*")):
+        if terms.is_file():
+            shutil.copyfile(terms, folder / terms.name)
     element = scene_element(room, max_depth=max_depth, resolution=resolution, spp=spp)
     indent(element, "  ")
     ElementTree(element).write(folder / "scene.xml", encoding="utf-8", xml_declaration=True)
     write_scene_glb(room.scene, folder / "room.glb")
-    if room.openings is not None:
+    if len(room.openings):
         (folder / OPENINGS).write_text(json.dumps(room.openings.tolist()) + "\n", encoding="utf-8")
     text = json.dumps(describe(room), indent=1, allow_nan=False, ensure_ascii=False)
     (folder / "room.json").write_text(text + "\n", encoding="utf-8")
