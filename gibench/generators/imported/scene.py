@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.etree.ElementTree import tostring
 
+from gibench.generators.imported.analytic import mesh_shapes
 from gibench.generators.imported.channels import single_channels
 from gibench.generators.imported.errors import SceneFileError
 from gibench.generators.imported.files import destinations, named_files, settle_missing
@@ -120,6 +121,7 @@ def import_scene(file: Path, settings: ImportSettings | None = None) -> Imported
     single_channels(tree, Path(scratch.name), note("channels"), legacy=legacy)
     expand_instances(tree.root, note("instances"))
     name_everything(tree.root)
+    mesh_shapes(tree, Path(scratch.name), note("analytic"))
     if not tree.root.nodes("shape"):
         raise SceneFileError(f"{file}: the scene has no shape, so there is nothing to see")
     up = up_axis(tree.root, settings.up)
