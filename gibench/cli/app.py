@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from gibench.cli import bench, dataset, doctor
+from gibench.cli import bench, convert, dataset, doctor
 
 app = typer.Typer(
     name="gibench",
@@ -14,6 +14,7 @@ app = typer.Typer(
 )
 app.add_typer(dataset.app, name="dataset")
 app.add_typer(bench.app, name="bench")
+app.command("convert")(convert.convert)
 app.command("doctor")(doctor.doctor)
 
 make_app = typer.Typer(name="make-dataset", add_completion=False, pretty_exceptions_enable=False)

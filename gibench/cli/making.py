@@ -86,20 +86,23 @@ def dry_run(recipe: Recipe, variant: str, workers: int) -> None:
 
 
 def _tell_scenes(root: Path) -> None:
-    """Say what was done to imported scenes; room.json beside each holds all of it."""
     for room in whole_rooms(root):
-        described = json.loads((room_folder(root, room) / "room.json").read_text(encoding="utf-8"))
-        source = described["source"]
-        changes = sum(change["count"] for change in source["changes"])
-        placed = f"{source['up']} up" + ("" if source["scale"] == 1 else f", scale {source['scale']:g}")
-        typer.echo(_row("scene", f"{described['kind']}: {placed}, {changes} changes"))
-        for warning in source["warnings"]:
-            typer.echo(_row("", f"warning: {warning}"))
-        for change in source["changes"]:
-            if change["loss"] or change["rule"] not in QUIET_RULES:
-                times = "" if change["count"] == 1 else f" ({change['count']} times)"
-                mark = "warning: " if change["loss"] else ""
-                typer.echo(_row("", f"{mark}{change['what']}{times}"))
+        tell_scene(json.loads((room_folder(root, room) / "room.json").read_text(encoding="utf-8")))
+
+
+def tell_scene(described: dict[str, Any]) -> None:
+    """Say what was done to an imported scene, from its room.json, which holds all of it."""
+    source = described["source"]
+    changes = sum(change["count"] for change in source["changes"])
+    placed = f"{source['up']} up" + ("" if source["scale"] == 1 else f", scale {source['scale']:g}")
+    typer.echo(_row("scene", f"{described['kind']}: {placed}, {changes} changes"))
+    for warning in source["warnings"]:
+        typer.echo(_row("", f"warning: {warning}"))
+    for change in source["changes"]:
+        if change["loss"] or change["rule"] not in QUIET_RULES:
+            times = "" if change["count"] == 1 else f" ({change['count']} times)"
+            mark = "warning: " if change["loss"] else ""
+            typer.echo(_row("", f"{mark}{change['what']}{times}"))
 
 
 def _tell_rejections(rejections: dict[str, int], rooms: dict[Any, str]) -> None:

@@ -107,7 +107,7 @@ def scene_element(
             SubElement(shape, "string", name="filename", value=f"meshes/{thing.name}.{number}.ply")
             SubElement(shape, "ref", id=material_name)
     for light in room.lights:
-        scene.append(_emitter(light))
+        scene.append(light_element(light))
     if outside is not None:
         # Lamps outnumber the sky, which would leave it few samples; half of them suit both.
         SubElement(outside, "float", name="sampling_weight", value=str(max(1, len(room.lights))))
@@ -142,7 +142,8 @@ def sensor_element(camera: Camera, name: str, resolution: tuple[int, int], spp: 
     return sensor
 
 
-def _emitter(light: Light) -> Element:
+def light_element(light: Light) -> Element:
+    """The `<shape>` of a lamp's light, which refers to the material LAMP_MATERIAL."""
     shape = Element("shape", type=light.shape, id=light.name)
     if light.shape == "sphere":
         x, y, z = (_number(c) for c in light.centre)

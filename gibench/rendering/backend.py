@@ -15,6 +15,7 @@ import os
 import platform
 import re
 import sys
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
@@ -213,6 +214,21 @@ def limit_threads(count: int) -> None:
     import drjit as dr
 
     dr.set_thread_count(count)
+
+
+@contextlib.contextmanager
+def threads_to_load() -> Iterator[None]:
+    """Two threads at least while Mitsuba reads files: with one alone its reader of OpenEXR waits for ever."""
+    import drjit as dr
+
+    count = dr.thread_count()
+    if count < 2:
+        dr.set_thread_count(2)
+    try:
+        yield
+    finally:
+        if count < 2:
+            dr.set_thread_count(count)
 
 
 def versions() -> dict[str, str]:

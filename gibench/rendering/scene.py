@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gibench.errors import GibenchError
-from gibench.rendering.backend import is_scalar, select_variant
+from gibench.rendering.backend import is_scalar, select_variant, threads_to_load
 from gibench.rendering.kernel_sharing import spare_plugins
 
 OPENINGS = "openings.json"
@@ -145,7 +145,8 @@ def load_scene(path: str | Path, *, share_kernels: bool = False) -> Scene:
         raise SceneError(f"there is no scene file {path}")
     try:
         # Mitsuba would merge shapes that share a material, and their ids with them.
-        scene = wrap(mi.load_file(str(path), optimize=False))
+        with threads_to_load():
+            scene = wrap(mi.load_file(str(path), optimize=False))
     except RuntimeError as error:
         reason = " ".join(str(error).split())
         raise SceneError(f"Mitsuba refuses {path}: {reason}") from error

@@ -60,6 +60,14 @@ def new(tag: str, like: Node, **attributes: str) -> Node:
     return node
 
 
+def copied(node: Node) -> Node:
+    """A copy of an element and all below it."""
+    copy = Node(node.tag, dict(node.attrib))
+    copy.where = node.where
+    copy[:] = [copied(child) for child in node.nodes()]
+    return copy
+
+
 @dataclass(frozen=True)
 class SceneTree:
     """A scene file with everything that it includes.

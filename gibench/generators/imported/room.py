@@ -151,7 +151,7 @@ def scene_element(room: ImportedRoom, *, max_depth: int, resolution: tuple[int, 
     SubElement(integrator, "integer", name="max_depth", value=str(max_depth))
     for number, camera in enumerate(room.cameras):
         element.append(sensor_element(camera, f"camera.{number}", resolution, spp))
-    element.extend(child for child in source.nodes() if child.tag != "sensor")
+    element.extend(source.nodes())
     return element
 
 

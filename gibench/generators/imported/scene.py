@@ -17,12 +17,19 @@ from gibench.generators.imported.errors import SceneFileError
 from gibench.generators.imported.files import destinations, named_files, settle_missing
 from gibench.generators.imported.own_cameras import GivenCamera, cameras_of, read_camera_file
 from gibench.generators.imported.placing import place, placed_matrix, up_axis
-from gibench.generators.imported.reading import Node, SceneTree, read_tree
+from gibench.generators.imported.reading import Node, SceneTree, copied, read_tree
 from gibench.generators.imported.shapes import check_references, expand_instances, name_everything
 from gibench.generators.imported.upgrading import Change, is_legacy, upgrade
 
 if TYPE_CHECKING:
     from gibench.rendering.scene import Scene
+
+
+DEFAULT_SIZE = (768, 576)
+"""Mitsuba's, of a film."""
+
+DEFAULT_DEPTH = -1
+"""Mitsuba's, of a path tracer: no limit."""
 
 
 @dataclass(frozen=True)
@@ -46,8 +53,10 @@ class ImportedScene:
     """A scene in Z-up metres that Mitsuba 3 reads.
 
     name: that of its folder, or of its file where that says more. tree: the scene, its file names as in the source. up,
-    scale: what was done to it. cameras: its own, then those of the camera file. changes: what was rewritten, missing:
-    files that were left out, as the scene names them.
+    scale: what was done to it. cameras: its own, then those of the camera file. resolution: (width, height) of its
+    first film; max_depth: of its integrator, as Mitsuba counts. changes: what was rewritten, missing: files that were
+    left out, as the scene names them. files: file → name in a room's folder. scratch: the folder of files that were
+    made, which lives as long as the scene.
     """
 
     name: str
@@ -55,16 +64,18 @@ class ImportedScene:
     up: str
     scale: float
     cameras: tuple[GivenCamera, ...]
+    resolution: tuple[int, int]
+    max_depth: int
     changes: tuple[Change, ...]
     missing: tuple[str, ...]
     warnings: tuple[str, ...] = ()
     files: Mapping[Path, str] = field(default_factory=dict)
-    scratch: Any = None  # the folder of files that were made, which lives as long as the scene
+    scratch: Any = None
 
     @cached_property
     def loaded(self) -> Scene:
         """The scene under Mitsuba's current variant. Raises SceneFileError with Mitsuba's reason."""
-        from gibench.rendering.backend import select_variant
+        from gibench.rendering.backend import select_variant, threads_to_load
 
         select_variant()
         import mitsuba as mi
@@ -72,10 +83,9 @@ class ImportedScene:
         from gibench.rendering.scene import wrap
 
         root = self.with_files(absolute=True)
-        for sensor in root.nodes("sensor"):
-            root.remove(sensor)
         try:
-            return wrap(mi.load_string(tostring(root, encoding="unicode"), optimize=False))
+            with threads_to_load():
+                return wrap(mi.load_string(tostring(root, encoding="unicode"), optimize=False))
         except RuntimeError as problem:
             reason = " ".join(str(problem).split())
             raise SceneFileError(f"Mitsuba refuses {self.tree.file}: {reason}") from None
@@ -86,17 +96,10 @@ class ImportedScene:
 
     def with_files(self, *, absolute: bool = False) -> Node:
         """A copy of the scene whose file names are absolute, or those of a room's folder."""
-        copy = replace(self.tree, root=_copied(self.tree.root))
+        copy = replace(self.tree, root=copied(self.tree.root))
         for _, name, path in named_files(copy):
             name.set("value", str(path.resolve()) if absolute else self.files[path.resolve()])
         return copy.root
-
-
-def _copied(node: Node) -> Node:
-    copy = Node(node.tag, dict(node.attrib))
-    copy.where = node.where
-    copy[:] = [_copied(child) for child in node.nodes()]
-    return copy
 
 
 def import_scene(file: Path, settings: ImportSettings | None = None) -> ImportedScene:
@@ -129,6 +132,7 @@ def import_scene(file: Path, settings: ImportSettings | None = None) -> Imported
     cameras = cameras_of(tree.root, note("cameras"))
     if settings.cameras is not None:
         cameras += read_camera_file(settings.cameras, placed_matrix(up, settings.scale))
+    resolution, max_depth = _settled_settings(tree.root)
     warnings = []
     if not any(node.tag == "emitter" for node in tree.root.everything()):
         warnings.append("the scene has no light: everything in it is black")
@@ -142,12 +146,35 @@ def import_scene(file: Path, settings: ImportSettings | None = None) -> Imported
         up=up,
         scale=settings.scale,
         cameras=tuple(cameras),
+        resolution=resolution,
+        max_depth=max_depth,
         changes=tuple(changes),
         missing=tuple(missing),
         warnings=tuple(warnings),
         files=destinations(tree),
         scratch=scratch,
     )
+
+
+def _settled_settings(root: Node) -> tuple[tuple[int, int], int]:
+    """Size of the first film and depth of the integrator; sensors and integrators go, as whoever renders has them."""
+    size, depth = DEFAULT_SIZE, DEFAULT_DEPTH
+    for node in root.nodes("sensor", "integrator"):
+        root.remove(node)
+        for film in node.nodes("film")[:1]:
+            if size is DEFAULT_SIZE:
+                size = (_whole(film, "width", size[0]), _whole(film, "height", size[1]))
+        if node.tag == "integrator":
+            depth = _whole(node, "max_depth", DEFAULT_DEPTH)
+    return size, depth
+
+
+def _whole(node: Node, name: str, default: int) -> int:
+    text = node.value(name, str(default))
+    try:
+        return int(text)
+    except ValueError:
+        raise SceneFileError(f"{node.where}: {name} '{text}' is no whole number") from None
 
 
 def scene_title(file: Path) -> str:

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
-from copy import deepcopy
 from pathlib import Path
 
 from gibench.generators.imported.errors import SceneFileError
-from gibench.generators.imported.reading import Node, new
+from gibench.generators.imported.reading import Node, copied, new
 from gibench.generators.imported.transforms import matrix_of
 from gibench.generators.imported.upgrading import Note
-
-EMITTING = ("emitter",)
 
 
 def expand_instances(root: Node, note: Note) -> None:
@@ -32,7 +29,7 @@ def expand_instances(root: Node, note: Note) -> None:
         root.remove(node)
         placed = matrix_of(node.property("to_world"))
         for number, shape in enumerate(group.nodes("shape")):
-            copy = deepcopy(shape)
+            copy = copied(shape)
             copy.attrib.pop("id", None)
             transform = copy.property("to_world")
             if transform is None:

@@ -537,11 +537,13 @@ def media(root: Node, note: Note) -> None:
 
 
 def integrators(root: Node, note: Note) -> None:
-    """Every integrator becomes the path tracer of whoever renders the scene."""
+    """Every integrator becomes a path tracer of the same depth."""
     for node in root.nodes("integrator"):
-        root.remove(node)
-        if node.type not in ("path",):
-            note(node, f"integrator {node.type} is path", loss=node.type in ("direct", "ao", "depth"))
+        if node.type == "path":
+            continue
+        depth = node.property("max_depth")
+        note(node, f"integrator {node.type} is path", loss=node.type in ("direct", "ao", "depth"))
+        _become(node, "path", *([depth] if depth is not None else []))
 
 
 def films(root: Node, note: Note) -> None:
