@@ -63,7 +63,12 @@ def write_room(
 
 
 def write_ply(mesh: Mesh, path: Path, *, tile: tuple[float, float] = (1.0, 1.0)) -> None:
-    """Write a mesh as binary little-endian PLY with float32 positions, normals and UVs.
+    """Write a mesh as PLY; see `ply_bytes`."""
+    path.write_bytes(ply_bytes(mesh, tile=tile))
+
+
+def ply_bytes(mesh: Mesh, *, tile: tuple[float, float] = (1.0, 1.0)) -> bytes:
+    """A mesh as binary little-endian PLY with float32 positions, normals and UVs.
 
     tile: metres that the texture's tile covers; UVs are divided by it. Scaling them here rather than by a transform
     of each texture keeps materials alike, so that Dr.Jit compiles one kernel for them all, and for the next room.
@@ -83,7 +88,7 @@ def write_ply(mesh: Mesh, path: Path, *, tile: tuple[float, float] = (1.0, 1.0))
     vertices = np.concatenate(
         [mesh.vertices, mesh.normals, mesh.uvs / tile], 1, dtype="<f4", casting="same_kind"
     )
-    path.write_bytes("\n".join(lines).encode("ascii") + vertices.tobytes() + faces.tobytes())
+    return "\n".join(lines).encode("ascii") + vertices.tobytes() + faces.tobytes()
 
 
 def scene_element(

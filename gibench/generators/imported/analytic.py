@@ -6,7 +6,7 @@ What only mirrors or refracts, and every lamp, stays the exact shape that it is.
 from __future__ import annotations
 
 import math
-from pathlib import Path
+import re
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from gibench.generators.imported.reading import Node, SceneTree, new
 from gibench.generators.imported.transforms import numbers, triple
 from gibench.generators.imported.upgrading import Note
 from gibench.generators.parts import FloatArray, IntArray, Mesh
-from gibench.generators.scene_files import write_ply
+from gibench.generators.scene_files import ply_bytes
 
 SEGMENTS = 128
 """Around a circle: its polygon is nowhere further away than 0.03 % of the radius."""
@@ -26,8 +26,8 @@ DIFFUSE = frozenset(
 """Materials with a diffuse lobe."""
 
 
-def mesh_shapes(tree: SceneTree, folder: Path, note: Note) -> None:
-    """Turn analytic shapes with a diffuse lobe into meshes, in place; the files go into a folder.
+def mesh_shapes(tree: SceneTree, note: Note) -> None:
+    """Turn analytic shapes with a diffuse lobe into meshes, in place.
 
     Their UVs are those of the analytic shape. Raises SceneFileError for a shape of no size.
     """
@@ -37,9 +37,9 @@ def mesh_shapes(tree: SceneTree, folder: Path, note: Note) -> None:
         if make is None or node.nodes("emitter") or not _is_diffuse(node, by_id):
             continue
         mesh = make(node)
-        name = f"{node.get('id')}.ply"
-        write_ply(mesh, folder / name)
-        tree.made[name] = folder / name
+        plain = re.sub(r"[^\w.-]", "_", node.get("id", ""))
+        name = f"{plain}.{len(tree.made)}.ply"
+        tree.made[name] = ply_bytes(mesh)
         note(node, f"a {node.type} is a mesh", loss=node.type != "rectangle")
         for gone in ("center", "radius", "p0", "p1"):
             if (part := node.property(gone)) is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 from PIL import Image, UnidentifiedImageError
@@ -13,10 +14,10 @@ from gibench.generators.imported.upgrading import Note
 BANDS = {"r": 0, "g": 1, "b": 2, "a": 3}
 
 
-def single_channels(tree: SceneTree, folder: Path, note: Note, *, legacy: bool) -> None:
+def single_channels(tree: SceneTree, note: Note, *, legacy: bool) -> None:
     """Make an image for every bitmap with a `channel`, in place.
 
-    folder: where the images go. legacy: opacities are also meant by the alpha channel of their image where it has one;
+    legacy: opacities are also meant by the alpha channel of their image where it has one;
     without it, the colours of leaves decided where they end.
     """
     names: dict[tuple[Path, str], str] = {}
@@ -36,8 +37,9 @@ def single_channels(tree: SceneTree, folder: Path, note: Note, *, legacy: bool) 
             node.remove(asked)
             note(node, f"channel {channel} of {path.name} is an image of its own")
         made = names.setdefault((path.resolve(), channel), f"{path.stem}.{channel}.{len(names)}.png")
-        _band(node, path, channel).save(folder / made)
-        tree.made[made] = folder / made
+        content = io.BytesIO()
+        _band(node, path, channel).save(content, "PNG")
+        tree.made[made] = content.getvalue()
         name.set("value", made)
         if channel == "a" and node.property("raw") is None:
             node.append(new("boolean", node, name="raw", value="true"))

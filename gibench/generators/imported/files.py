@@ -21,8 +21,8 @@ SIGNATURES = (
 MISSING_COLOR = 0.5
 
 
-def named_files(tree: SceneTree) -> list[tuple[Node, Node, Path]]:
-    """(plugin, its filename, where that file should lie) of every file that a scene names.
+def named_files(tree: SceneTree) -> list[tuple[Node, Node, Path | str]]:
+    """(plugin, its filename, `SceneTree.source`) of every file that a scene names.
 
     Raises SceneFileError for one outside the scene's folder.
     """
@@ -30,7 +30,7 @@ def named_files(tree: SceneTree) -> list[tuple[Node, Node, Path]]:
     for node in tree.root.everything():
         name = node.property("filename")
         if name is not None and name.tag == "string":
-            found.append((node, name, tree.located(name.get("value", ""), name.where)))
+            found.append((node, name, tree.source(name.get("value", ""), name.where)))
     return found
 
 
@@ -41,7 +41,7 @@ def settle_missing(tree: SceneTree, *, allow_missing: bool) -> list[str]:
     SceneFileError with all of them where that is not allowed, and for a texture that is no image.
     """
     named = named_files(tree)
-    missing = [(node, name) for node, name, path in named if not path.is_file()]
+    missing = [(node, name) for node, name, path in named if isinstance(path, Path) and not path.is_file()]
     if missing and not allow_missing:
         listed = ", ".join(dict.fromkeys(name.get("value", "") for _, name in missing))
         raise SceneFileError(
@@ -49,7 +49,7 @@ def settle_missing(tree: SceneTree, *, allow_missing: bool) -> list[str]:
             "--allow-missing"
         )
     for node, _, path in named:
-        if path.is_file() and node.tag in ("texture", "emitter"):
+        if isinstance(path, Path) and path.is_file() and node.tag in ("texture", "emitter"):
             _check_image(node, path)
     parents = {id(child): node for node in tree.root.everything() for child in node}
     for node, _ in missing:
@@ -73,16 +73,16 @@ def _check_image(node: Node, path: Path) -> None:
         )
 
 
-def destinations(tree: SceneTree) -> dict[Path, str]:
+def destinations(tree: SceneTree) -> dict[Path | str, str]:
     """File → its name in a room's folder: meshes/… for shapes, textures/… for images. Equal names are told apart."""
-    result: dict[Path, str] = {}
+    result: dict[Path | str, str] = {}
     taken: set[str] = set()
-    for node, _, path in named_files(tree):
-        source = path.resolve()
+    for node, _, source in named_files(tree):
         if source in result:
             continue
         folder = "meshes" if node.tag == "shape" else "textures"
         # No blanks: they trip over shells and other programs' parsers.
+        path = Path(source)
         stem, number = path.stem.replace(" ", "_"), 1
         name = f"{folder}/{stem}{path.suffix}"
         while name.lower() in taken:

@@ -24,7 +24,7 @@ def write_scene_glb(scene: ImportedScene, path: Path) -> None:
     """Write a GLB file of all meshes of a scene; shapes that are no meshes, and the environment, are left out."""
     document = GlbDocument()
     by_id = {node.get("id", ""): node for node in scene.tree.root.everything() if node.tag != "ref"}
-    images: dict[Path, int] = {}
+    images: dict[Path | str, int] = {}
     numbers: dict[int, int] = {}
     things: dict[str, list[dict[str, Any]]] = {}
     for shape in sorted(scene.loaded.mi_scene.shapes(), key=lambda s: s.id()):
@@ -71,7 +71,7 @@ def _material(
     document: GlbDocument,
     scene: ImportedScene,
     by_id: dict[str, Node],
-    images: dict[Path, int],
+    images: dict[Path | str, int],
     bsdf: Node | None,
     emits: bool,
 ) -> dict[str, Any]:
@@ -114,13 +114,15 @@ def _constant(color: Node) -> tuple[float, ...] | None:
     return tuple(values * 3 if len(values) == 1 else values)
 
 
-def _texture(document: GlbDocument, scene: ImportedScene, images: dict[Path, int], color: Node) -> int | None:
+def _texture(
+    document: GlbDocument, scene: ImportedScene, images: dict[Path | str, int], color: Node
+) -> int | None:
     name = color.property("filename")
     if color.tag != "texture" or color.type != "bitmap" or name is None:
         return None
-    path = scene.tree.located(name.get("value", ""), name.where).resolve()
+    path = scene.tree.source(name.get("value", ""), name.where)
     if path not in images:
-        content = path.read_bytes()
+        content = scene.tree.content(path)
         mime = next((mime for start, mime in MIMES.items() if content.startswith(start)), None)
         if mime is None:
             return None

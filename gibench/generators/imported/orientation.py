@@ -7,14 +7,17 @@ room, from where of a shape that is right no back is seen.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 
-from gibench.generators.imported.reading import Node, new
+from gibench.generators.imported.reading import Node, copied, new
 from gibench.generators.imported.scene import ImportedScene
 from gibench.generators.imported.survey import hits
 from gibench.generators.imported.upgrading import Change
 from gibench.generators.parts import FloatArray
-from gibench.rendering.free_space import sphere
+from gibench.rendering.free_space import NoFreeSpace, free_space, sphere
 from gibench.rendering.scene import Scene
 
 POINTS, RAYS = 1024, 64
@@ -34,26 +37,51 @@ ONE_SIDED = (
 """Materials to which it matters which side they are seen from."""
 
 
-def turned_round(scene: ImportedScene, found: FloatArray) -> ImportedScene:
-    """The scene with its shapes facing the room, where that changes nothing of the image.
+WHAT = "a shape that turned its back to the room is turned round"
 
-    found: (N, 3) points of its free space. Returns the scene itself where nothing was wrong.
+
+def oriented(scene: ImportedScene) -> tuple[ImportedScene, FloatArray]:
+    """The scene with its shapes facing the room, where that changes nothing of the image, and its free space (N, 3).
+
+    Needs a vectorised variant. Raises NoFreeSpace where nothing is enclosed, whichever way round it is.
     """
-    by_id = {node.get("id", ""): node for node in scene.tree.root.everything() if node.tag != "ref"}
-    turned = []
-    for name in inverted(scene.loaded, found):
+    try:
+        found = free_space(scene.loaded)
+    except NoFreeSpace:
+        # A room whose walls all face outward has no inside: try it the other way round.
+        inside_out = turned_round(scene, scene.loaded.shapes)
+        if inside_out is scene:
+            raise
+        scene, found = inside_out, free_space(inside_out.loaded)
+    turned = turned_round(scene, inverted(scene.loaded, found))
+    if turned is scene:
+        return scene, found
+    return turned, free_space(turned.loaded)
+
+
+def turned_round(scene: ImportedScene, names: Sequence[str]) -> ImportedScene:
+    """The scene with these shapes turned round where both sides look the same; itself where none does."""
+    root = copied(scene.tree.root)
+    by_id = {node.get("id", ""): node for node in root.everything() if node.tag != "ref"}
+    changes = [change for change in scene.changes if change.rule != "orientation"]
+    before = {change.where for change in scene.changes if change.rule == "orientation"}
+    turned = False
+    for name in names:
         node = by_id[name]
         if not _is_two_sided(node, by_id):
             continue
+        turned = True
+        # Turned twice is as it was.
+        before ^= {node.where}
         flag = node.property("flip_normals")
         if flag is None:
             node.append(new("boolean", node, name="flip_normals", value="true"))
         else:
             flag.set("value", "false" if flag.get("value") == "true" else "true")
-        turned.append(
-            Change("orientation", "a shape that turned its back to the room is turned round", node.where)
-        )
-    return scene.changed(turned) if turned else scene
+    if not turned:
+        return scene
+    changes += [Change("orientation", WHAT, where) for where in sorted(before)]
+    return replace(scene, tree=replace(scene.tree, root=root), changes=tuple(changes))
 
 
 def inverted(scene: Scene, found: FloatArray) -> list[str]:

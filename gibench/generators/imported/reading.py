@@ -73,27 +73,33 @@ class SceneTree:
     """A scene file with everything that it includes.
 
     root: its `<scene>`. file: where it came from. allow_outside: whether files may lie outside its folder. searched:
-    more folders that files are looked for in. made: files that were made during the import, by name.
+    more folders that files are looked for in. made: content of files that were made during the import, by name.
     """
 
     root: Node
     file: Path
     allow_outside: bool = False
     searched: list[Path] = field(default_factory=list)
-    made: dict[str, Path] = field(default_factory=dict)
+    made: dict[str, bytes] = field(default_factory=dict)
 
     @property
     def folder(self) -> Path:
         """Folder that file names count from."""
         return self.file.parent
 
+    def source(self, name: str, where: str) -> Path | str:
+        """Where a file that the scene names lies; the name itself where it was made during the import."""
+        return name if name in self.made else self.located(name, where)
+
+    def content(self, source: Path | str) -> bytes:
+        """Content of a file."""
+        return self.made[source] if isinstance(source, str) else source.read_bytes()
+
     def located(self, name: str, where: str) -> Path:
         """Where a file that the scene names lies, whether it is there or not.
 
         Raises SceneFileError where that is outside the scene's folder and not allowed.
         """
-        if name in self.made:
-            return self.made[name]
         # Windows' separators are common in old scenes; no file of such a scene has one in its name.
         name = name.strip().replace("\\", "/")
         candidates = [folder / name for folder in (self.folder, *self.searched)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from dataclasses import replace
 from pathlib import Path
 from xml.etree.ElementTree import Element
@@ -38,12 +39,13 @@ def lit_by_environment(scene: ImportedScene, environment: Environment) -> Import
     # A file of each environment, as the scene may be lit by another one later.
     number = sum(name.startswith("environment") for name in scene.tree.made)
     name = f"environment{number}.hdr"
-    emitter = write_panorama(environment, Path(scene.scratch.name), name)
-    if emitter is None:
-        return _relit(scene, root, "there is no light")
-    scene.tree.made[name] = Path(scene.scratch.name) / name
+    with tempfile.TemporaryDirectory(prefix="gibench-") as scratch:
+        emitter = write_panorama(environment, Path(scratch), name)
+        if emitter is None:
+            return _relit(scene, root, "there is no light")
+        made = {**scene.tree.made, name: (Path(scratch) / name).read_bytes()}
     root.append(_node(emitter, root.where))
-    return _relit(scene, root, f"all light is that of an environment ({environment.kind})")
+    return _relit(scene, root, f"all light is that of an environment ({environment.kind})", made)
 
 
 def _unlit(scene: ImportedScene) -> Node:
@@ -62,8 +64,10 @@ def _node(element: Element, where: str) -> Node:
     return node
 
 
-def _relit(scene: ImportedScene, root: Node, what: str) -> ImportedScene:
-    tree = replace(scene.tree, root=root)
+def _relit(
+    scene: ImportedScene, root: Node, what: str, made: dict[str, bytes] | None = None
+) -> ImportedScene:
+    tree = replace(scene.tree, root=root, made=scene.tree.made if made is None else made)
     change = Change("relighting", what, root.where, loss=True)
     dark = "the scene has no light: everything in it is black"
     return replace(

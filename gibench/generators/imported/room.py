@@ -67,17 +67,17 @@ def import_room(
     """
     # These bring the renderer.
     from gibench.generators.imported.openings import find_openings
-    from gibench.generators.imported.orientation import turned_round
-    from gibench.rendering.free_space import NoFreeSpace, free_space
+    from gibench.generators.imported.orientation import oriented
+    from gibench.rendering.backend import is_scalar, select_variant
+    from gibench.rendering.free_space import NoFreeSpace
 
-    found, why_none = np.zeros((0, 3)), ""
-    try:
-        found = free_space(scene.loaded)
-        turned = turned_round(scene, found)
-        if turned is not scene:
-            scene, found = turned, free_space(turned.loaded)
-    except NoFreeSpace as problem:
-        why_none = str(problem)
+    select_variant()
+    found, why_none = np.zeros((0, 3)), "the variant scalar_rgb is too slow to look for one"
+    if not is_scalar():
+        try:
+            scene, found = oriented(scene)
+        except NoFreeSpace as problem:
+            why_none = str(problem)
     openings = find_openings(scene.loaded, found) if len(found) else np.zeros((0, 3, 3))
     cameras = [camera.at(resolution) for camera in scene.cameras]
     rejections: Counter[str] = Counter()
@@ -126,6 +126,9 @@ def write_imported_room(
     for name in ("meshes", "textures"):
         (folder / name).mkdir(parents=True, exist_ok=True)
     for source, name in room.scene.files.items():
+        if isinstance(source, str):
+            (folder / name).write_bytes(room.scene.tree.made[source])
+            continue
         try:
             shutil.copyfile(source, folder / name)
         except FileNotFoundError:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -55,8 +55,7 @@ class ImportedScene:
     name: that of its folder, or of its file where that says more. tree: the scene, its file names as in the source. up,
     scale: what was done to it. cameras: its own, then those of the camera file. resolution: (width, height) of its
     first film; max_depth: of its integrator, as Mitsuba counts. changes: what was rewritten, missing: files that were
-    left out, as the scene names them. files: file → name in a room's folder. scratch: the folder of files that were
-    made, which lives as long as the scene.
+    left out, as the scene names them. files: file → name in a room's folder.
     """
 
     name: str
@@ -69,8 +68,7 @@ class ImportedScene:
     changes: tuple[Change, ...]
     missing: tuple[str, ...]
     warnings: tuple[str, ...] = ()
-    files: Mapping[Path, str] = field(default_factory=dict)
-    scratch: Any = None
+    files: Mapping[Path | str, str] = field(default_factory=dict)
 
     @cached_property
     def loaded(self) -> Scene:
@@ -82,23 +80,30 @@ class ImportedScene:
 
         from gibench.rendering.scene import wrap
 
-        root = self.with_files(absolute=True)
-        try:
-            with threads_to_load():
-                return wrap(mi.load_string(tostring(root, encoding="unicode"), optimize=False))
-        except RuntimeError as problem:
-            reason = " ".join(str(problem).split())
-            raise SceneFileError(f"Mitsuba refuses {self.tree.file}: {reason}") from None
+        # Mitsuba reads files alone, and only while it loads.
+        with tempfile.TemporaryDirectory(prefix="gibench-") as scratch:
+            for name, content in self.tree.made.items():
+                (Path(scratch) / name).write_bytes(content)
 
-    def changed(self, changes: Iterable[Change]) -> ImportedScene:
-        """The scene after its tree was rewritten; it is loaded anew."""
-        return replace(self, changes=(*self.changes, *changes))
+            def absolute(source: Path | str) -> str:
+                return f"{scratch}/{source}" if isinstance(source, str) else str(source.resolve())
 
-    def with_files(self, *, absolute: bool = False) -> Node:
-        """A copy of the scene whose file names are absolute, or those of a room's folder."""
+            text = tostring(self._with_files(absolute), "unicode")
+            try:
+                with threads_to_load():
+                    return wrap(mi.load_string(text, optimize=False))
+            except RuntimeError as problem:
+                reason = " ".join(str(problem).split())
+                raise SceneFileError(f"Mitsuba refuses {self.tree.file}: {reason}") from None
+
+    def with_files(self) -> Node:
+        """A copy of the scene whose file names are those of a room's folder."""
+        return self._with_files(lambda source: self.files[source])
+
+    def _with_files(self, named: Callable[[Path | str], str]) -> Node:
         copy = replace(self.tree, root=copied(self.tree.root))
-        for _, name, path in named_files(copy):
-            name.set("value", str(path.resolve()) if absolute else self.files[path.resolve()])
+        for _, name, source in named_files(copy):
+            name.set("value", named(source))
         return copy.root
 
 
@@ -120,11 +125,10 @@ def import_scene(file: Path, settings: ImportSettings | None = None) -> Imported
 
     check_references(tree.root)
     missing = settle_missing(tree, allow_missing=settings.allow_missing)
-    scratch = tempfile.TemporaryDirectory(prefix="gibench-scene-")
-    single_channels(tree, Path(scratch.name), note("channels"), legacy=legacy)
+    single_channels(tree, note("channels"), legacy=legacy)
     expand_instances(tree.root, note("instances"))
     name_everything(tree.root)
-    mesh_shapes(tree, Path(scratch.name), note("analytic"))
+    mesh_shapes(tree, note("analytic"))
     if not tree.root.nodes("shape"):
         raise SceneFileError(f"{file}: the scene has no shape, so there is nothing to see")
     up = up_axis(tree.root, settings.up)
@@ -152,7 +156,6 @@ def import_scene(file: Path, settings: ImportSettings | None = None) -> Imported
         missing=tuple(missing),
         warnings=tuple(warnings),
         files=destinations(tree),
-        scratch=scratch,
     )
 
 
@@ -191,7 +194,7 @@ def fingerprint(file: Path, settings: ImportSettings) -> str:
     digest = hashlib.sha256(tostring(tree.root))
     for _, name, path in named_files(tree):
         digest.update(name.get("value", "").encode() + b"\0")
-        if path.is_file():
+        if isinstance(path, Path) and path.is_file():
             with path.open("rb") as content:
                 digest.update(hashlib.file_digest(content, "sha256").digest())
     return digest.hexdigest()

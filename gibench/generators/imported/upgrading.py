@@ -13,9 +13,12 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 from gibench.generators.imported.errors import SceneFileError
 from gibench.generators.imported.reading import Node, SceneTree, new
 from gibench.generators.imported.shipped import check_plugins
+from gibench.generators.imported.transforms import triple
 
 
 @dataclass(frozen=True)
@@ -34,7 +37,7 @@ Note = Callable[..., None]
 Rule = Callable[[Node, Note], None]
 """Rewrites the tree below a `<scene>` in place."""
 
-_SHAPE_OF_SPECTRUM = re.compile(r"\s*[-+.\deE]+\s*")
+_ONE_NUMBER = re.compile(r"\s*[-+.\deE]+\s*")
 
 
 def upgrade(tree: SceneTree) -> list[Change]:
@@ -117,7 +120,8 @@ def property_names(root: Node, note: Note) -> None:
     """camelCase names of properties become snake_case."""
     for node in root.everything():
         name = node.get("name")
-        if name is None or name == name.lower() or node.tag == "default":
+        # The name of a material inside a mesh is that of a group in its file.
+        if name is None or name == name.lower() or node.tag in ("default", "bsdf"):
             continue
         # IOR first, or its letters would be parted.
         better = re.sub(r"(?<=[a-z0-9])([A-Z])", r"_\1", name.replace("IOR", "Ior")).lower()
@@ -133,6 +137,19 @@ def transform_tags(root: Node, note: Note) -> None:
             note(node, "<lookAt> is <lookat>")
 
 
+def rotation_axes(root: Node, note: Note) -> None:
+    """Axes of rotations become unit vectors, which they were taken for."""
+    for node in root.everything():
+        if node.tag != "rotate":
+            continue
+        axis = triple(node, 0.0)
+        length = float(np.linalg.norm(axis))
+        if length > 0 and abs(length - 1) > 1e-6:
+            node.attrib.pop("value", None)
+            node.attrib.update(zip("xyz", map(repr, (axis / length).tolist()), strict=True))
+            note(node, "the axis of a rotation is a unit vector")
+
+
 def animations(root: Node, note: Note) -> None:
     """Of an `<animation>` the first transformation stays: nothing moves here."""
     for node in root.everything():
@@ -143,6 +160,19 @@ def animations(root: Node, note: Note) -> None:
             node.attrib = {"name": name}
             node[:] = list(first[0]) if first else []
             note(node, "an animation stands still at its first transformation", loss=True)
+
+
+GONE = ("max_smooth_angle", "srgb", "collapse", "fast_fresnel", "kd_intersection_cost", "kd_traversal_cost")
+"""Settings without a counterpart: of smoothing meshes, of speed."""
+
+
+def gone_settings(root: Node, note: Note) -> None:
+    """Settings of shapes and materials that Mitsuba 3 does not know are left out."""
+    for node in root.everything():
+        for child in node.nodes("float", "integer", "boolean", "string"):
+            if node.tag in ("shape", "bsdf") and child.get("name") in GONE:
+                node.remove(child)
+                note(child, f"{child.get('name')} is left out", loss=child.get("name") == "max_smooth_angle")
 
 
 # Colours
@@ -186,7 +216,7 @@ def scalar_spectra(root: Node, note: Note) -> None:
     (1.205, 0.948, 0.909) in Rec. 709.
     """
     for node in root.everything():
-        if node.tag == "spectrum" and _SHAPE_OF_SPECTRUM.fullmatch(node.get("value", "")):
+        if node.tag == "spectrum" and _ONE_NUMBER.fullmatch(node.get("value", "")):
             node.tag = "rgb"
             note(node, f"a spectrum of {node.get('value')} is grey")
 
@@ -564,7 +594,9 @@ def films(root: Node, note: Note) -> None:
 LEGACY: tuple[Rule, ...] = (
     property_names,
     transform_tags,
+    rotation_axes,
     animations,
+    gone_settings,
     srgb_tags,
     scalar_spectra,
     conductors,

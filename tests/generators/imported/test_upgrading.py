@@ -76,6 +76,21 @@ def test_tags_of_transformations(tmp_path):
     loads(root)
 
 
+def test_axes_of_rotations_are_unit_vectors(tmp_path):
+    """Mitsuba 3 makes a shear of any other; a square that is only turned keeps its area."""
+    turned = '<transform name="toWorld"><rotate x="1" y="1" angle="40"/></transform>'
+    root, changes = upgraded(tmp_path, f'<shape type="rectangle">{turned}</shape>')
+    assert "rotation_axes" in rules_of(changes)
+    assert np.array(loads(root).shapes()[0].surface_area()).item() == pytest.approx(4, rel=1e-5)
+
+
+def test_settings_that_are_gone(tmp_path):
+    body = '<shape type="cube"><float name="maxSmoothAngle" value="30"/></shape>'
+    root, changes = upgraded(tmp_path, body)
+    assert [c.what for c in changes if c.rule == "gone_settings"] == ["max_smooth_angle is left out"]
+    loads(root)
+
+
 def test_an_animation_stands_still(tmp_path):
     body = (
         '<shape type="rectangle"><animation name="toWorld"><transform time="0"><translate x="1"/></transform>'
