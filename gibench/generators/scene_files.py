@@ -68,26 +68,25 @@ def write_ply(mesh: Mesh, path: Path, *, tile: tuple[float, float] = (1.0, 1.0))
 
 
 def ply_bytes(mesh: Mesh, *, tile: tuple[float, float] = (1.0, 1.0)) -> bytes:
-    """A mesh as binary little-endian PLY with float32 positions, normals and UVs.
+    """A mesh as binary little-endian PLY with float32 positions, normals and UVs, where it has these.
 
     tile: metres that the texture's tile covers; UVs are divided by it. Scaling them here rather than by a transform
     of each texture keeps materials alike, so that Dr.Jit compiles one kernel for them all, and for the next room.
     """
-    fields = ("x", "y", "z", "nx", "ny", "nz", "u", "v")
+    columns = {"x y z": mesh.vertices, "nx ny nz": mesh.normals, "u v": mesh.uvs / tile}
+    columns = {names: values for names, values in columns.items() if len(values) == len(mesh.vertices)}
     lines = [
         "ply",
         "format binary_little_endian 1.0",
         f"element vertex {len(mesh.vertices)}",
-        *(f"property float {name}" for name in fields),
+        *(f"property float {name}" for names in columns for name in names.split()),
         f"element face {len(mesh.faces)}",
         "property list uchar int vertex_indices",
         "end_header\n",
     ]
     faces = np.empty(len(mesh.faces), dtype=[("count", "u1"), ("corners", "<i4", 3)])
     faces["count"], faces["corners"] = 3, mesh.faces
-    vertices = np.concatenate(
-        [mesh.vertices, mesh.normals, mesh.uvs / tile], 1, dtype="<f4", casting="same_kind"
-    )
+    vertices = np.concatenate(list(columns.values()), 1, dtype="<f4", casting="same_kind")
     return "\n".join(lines).encode("ascii") + vertices.tobytes() + faces.tobytes()
 
 

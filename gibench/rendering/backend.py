@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import gc
 import importlib.metadata
 import logging
 import os
@@ -214,6 +215,18 @@ def limit_threads(count: int) -> None:
     import drjit as dr
 
     dr.set_thread_count(count)
+
+
+@contextlib.contextmanager
+def tracing() -> Iterator[None]:
+    """Nothing that others left in reference cycles dies in here: a scene that does while a kernel is traced, aborts."""
+    collecting = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collecting:
+            gc.enable()
 
 
 @contextlib.contextmanager

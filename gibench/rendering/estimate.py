@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gibench.errors import GibenchError
-from gibench.rendering.backend import is_scalar
+from gibench.rendering.backend import is_scalar, tracing
 from gibench.rendering.camera import PinholeCamera, RayGenerator
 from gibench.rendering.channels import PARTS
 from gibench.rendering.scene import Scene
@@ -255,7 +255,8 @@ def _add(
         )
         start = time.perf_counter()
         block = _Block(resolution[0], first, count, samples, estimate.levels, number, max_depth, guides)
-        launched = launch(scene, generator, block)
+        with tracing():
+            launched = launch(scene, generator, block)
         estimate.seconds += time.perf_counter() - start
         estimate.invalid += launched.invalid
         for name, value in launched.parts.items():

@@ -70,6 +70,8 @@ def cast(
     scene: Scene, origins: NDArray[Any], directions: NDArray[Any]
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
     """Distance (inf for a miss) and whether a front face was hit, (N,) each, of rays (N, 3) with unit directions."""
+    if not len(origins):  # on which Dr.Jit ends the process
+        return np.zeros(0, dtype=np.float32), np.zeros(0, dtype=bool)
     ray = mi.Ray3f(
         mi.Point3f(np.ascontiguousarray(origins.T, dtype=np.float32)),
         mi.Vector3f(np.ascontiguousarray(directions.T, dtype=np.float32)),

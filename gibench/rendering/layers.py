@@ -36,17 +36,22 @@ class Part:
     weight: Any
 
 
-def _children(bsdf: Any) -> list[Any]:
-    """The materials right below a material."""
-    found: list[Any] = []
+class _Children(mi.TraversalCallback):
+    """Collects the materials right below a material.
 
-    class Collect(mi.TraversalCallback):
-        def put(self, name, value, flags, cpptype=None):
-            if isinstance(value, mi.BSDF):
-                found.append(value)
+    Not defined where it is used: a class is a reference cycle, and what it held would die whenever Python looks for
+    cycles. Where that is while a kernel is traced, the process is aborted.
+    """
 
-    bsdf.traverse(Collect())
-    return found
+    def __init__(self) -> None:
+        """Nothing is found yet."""
+        super().__init__()
+        self.found: list[Any] = []
+
+    def put(self, name: str, value: Any, flags: Any, cpptype: Any = None) -> None:
+        """Called by Mitsuba for each thing that a material is made of."""
+        if isinstance(value, mi.BSDF):
+            self.found.append(value)
 
 
 def _key(bsdf: Any) -> int:
@@ -85,7 +90,9 @@ class Layers:
 
     def _look(self, bsdf: Any) -> int:
         """Note the tree below a material; returns its depth."""
-        children = _children(bsdf)
+        collector = _Children()
+        bsdf.traverse(collector)
+        children = collector.found
         name = bsdf.class_name()
         if not children:
             self.principled |= name in PRINCIPLED

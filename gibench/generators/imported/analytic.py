@@ -1,4 +1,4 @@
-"""Rectangles, disks, spheres and cylinders that reflect diffusely, as meshes: a lightmap needs triangles to lie on.
+"""Disks, spheres and cylinders that reflect diffusely, as meshes: a lightmap needs triangles to lie on.
 
 What only mirrors or refracts, and every lamp, stays the exact shape that it is.
 """
@@ -40,7 +40,7 @@ def mesh_shapes(tree: SceneTree, note: Note) -> None:
         plain = re.sub(r"[^\w.-]", "_", node.get("id", ""))
         name = f"{plain}.{len(tree.made)}.ply"
         tree.made[name] = ply_bytes(mesh)
-        note(node, f"a {node.type} is a mesh", loss=node.type != "rectangle")
+        note(node, f"a {node.type} is a mesh", loss=True)
         for gone in ("center", "radius", "p0", "p1"):
             if (part := node.property(gone)) is not None:
                 node.remove(part)
@@ -55,12 +55,6 @@ def _is_diffuse(shape: Node, by_id: dict[str, Node]) -> bool:
     return not bsdfs or any(
         part.type in DIFFUSE or part.tag == "ref" for bsdf in bsdfs for part in bsdf.everything()
     )
-
-
-def _rectangle(_node: Node) -> Mesh:
-    corners = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
-    faces = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
-    return Mesh(corners, faces, np.tile([0.0, 0, 1], (4, 1)), (corners[:, :2] + 1) / 2)
 
 
 def _disk(_node: Node) -> Mesh:
@@ -135,4 +129,4 @@ def _grid(rows: int, columns: int, *, outward: bool) -> IntArray:
     return (faces if outward else faces[:, ::-1]).astype(np.int32)
 
 
-MESHES = {"rectangle": _rectangle, "disk": _disk, "sphere": _sphere, "cylinder": _cylinder}
+MESHES = {"disk": _disk, "sphere": _sphere, "cylinder": _cylinder}

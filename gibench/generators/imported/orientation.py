@@ -12,9 +12,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from gibench.generators.imported.reading import Node, copied, new
+from gibench.generators.imported.reading import Node
 from gibench.generators.imported.scene import ImportedScene
 from gibench.generators.imported.survey import hits
+from gibench.generators.imported.turning import with_meshes_turned
 from gibench.generators.imported.upgrading import Change
 from gibench.generators.parts import FloatArray
 from gibench.rendering.free_space import NoFreeSpace, free_space, sphere
@@ -37,7 +38,7 @@ ONE_SIDED = (
 """Materials to which it matters which side they are seen from."""
 
 
-WHAT = "a shape that turned its back to the room is turned round"
+RULE, WHAT = "orientation", "a shape that turned its back to the room is turned round"
 
 
 def oriented(scene: ImportedScene) -> tuple[ImportedScene, FloatArray]:
@@ -61,27 +62,16 @@ def oriented(scene: ImportedScene) -> tuple[ImportedScene, FloatArray]:
 
 def turned_round(scene: ImportedScene, names: Sequence[str]) -> ImportedScene:
     """The scene with these shapes turned round where both sides look the same; itself where none does."""
-    root = copied(scene.tree.root)
-    by_id = {node.get("id", ""): node for node in root.everything() if node.tag != "ref"}
-    changes = [change for change in scene.changes if change.rule != "orientation"]
-    before = {change.where for change in scene.changes if change.rule == "orientation"}
-    turned = False
-    for name in names:
-        node = by_id[name]
-        if not _is_two_sided(node, by_id):
-            continue
-        turned = True
-        # Turned twice is as it was.
-        before ^= {node.where}
-        flag = node.property("flip_normals")
-        if flag is None:
-            node.append(new("boolean", node, name="flip_normals", value="true"))
-        else:
-            flag.set("value", "false" if flag.get("value") == "true" else "true")
-    if not turned:
+    by_id = {node.get("id", ""): node for node in scene.tree.root.everything() if node.tag != "ref"}
+    chosen = [name for name in names if _is_two_sided(by_id[name], by_id)]
+    if not chosen:
         return scene
-    changes += [Change("orientation", WHAT, where) for where in sorted(before)]
-    return replace(scene, tree=replace(scene.tree, root=root), changes=tuple(changes))
+    # Turned twice is as it was.
+    places = {change.where for change in scene.changes if change.rule == RULE}
+    places ^= {by_id[name].where for name in chosen}
+    others = tuple(change for change in scene.changes if change.rule != RULE)
+    changes = (*others, *(Change(RULE, WHAT, where) for where in sorted(places)))
+    return replace(with_meshes_turned(scene, chosen), changes=changes)
 
 
 def inverted(scene: Scene, found: FloatArray) -> list[str]:

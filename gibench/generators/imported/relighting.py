@@ -25,11 +25,15 @@ def lit_by_area_light(scene: ImportedScene, light: Light) -> ImportedScene:
         raise SceneFileError(
             f"the scene has something called '{light.name}' already: give the light another name"
         )
-    material = new("bsdf", root, type="diffuse", id=LAMP_MATERIAL)
+    taken = {node.get("id") for node in root.everything()}
+    name = LAMP_MATERIAL
+    while name in taken:
+        name += "."
+    material = new("bsdf", root, type="diffuse", id=name)
     material.append(new("rgb", root, name="reflectance", value="0"))
-    if not any(node.get("id") == LAMP_MATERIAL for node in root.everything()):
-        root.append(material)
-    root.append(_node(light_element(light), root.where))
+    lamp = _node(light_element(light), root.where)
+    lamp.nodes("ref")[0].set("id", name)
+    root.extend([material, lamp])
     return _relit(scene, root, f"all light is that of '{light.name}'")
 
 

@@ -65,19 +65,21 @@ def import_room(
 
     Raises SceneFileError where no view passes the checks, or where there is none at all.
     """
-    # These bring the renderer.
+    from gibench.rendering.backend import is_scalar, select_variant
+
+    select_variant()  # before anything loads Mitsuba, so that it finds the right LLVM
     from gibench.generators.imported.openings import find_openings
     from gibench.generators.imported.orientation import oriented
-    from gibench.rendering.backend import is_scalar, select_variant
+    from gibench.generators.imported.turning import without_flips
     from gibench.rendering.free_space import NoFreeSpace
 
-    select_variant()
     found, why_none = np.zeros((0, 3)), "the variant scalar_rgb is too slow to look for one"
     if not is_scalar():
         try:
             scene, found = oriented(scene)
         except NoFreeSpace as problem:
             why_none = str(problem)
+    scene = without_flips(scene)
     openings = find_openings(scene.loaded, found) if len(found) else np.zeros((0, 3, 3))
     cameras = [camera.at(resolution) for camera in scene.cameras]
     rejections: Counter[str] = Counter()

@@ -18,7 +18,11 @@ from gibench.generators.imported.files import destinations, named_files, settle_
 from gibench.generators.imported.own_cameras import GivenCamera, cameras_of, read_camera_file
 from gibench.generators.imported.placing import place, placed_matrix, up_axis
 from gibench.generators.imported.reading import Node, SceneTree, copied, read_tree
-from gibench.generators.imported.shapes import check_references, expand_instances, name_everything
+from gibench.generators.imported.shapes import (
+    check_references,
+    expand_instances,
+    name_everything,
+)
 from gibench.generators.imported.upgrading import Change, is_legacy, upgrade
 
 if TYPE_CHECKING:

@@ -53,8 +53,8 @@ def compared(name: str) -> tuple[np.ndarray, np.ndarray, dict]:
         PinholeCamera(camera.position, camera.target, camera.fov),
         resolution=(width, height),
         channels=("radiance", "surface"),
-        spp=256,
-        max_depth=64,
+        spp=64,
+        max_depth=16,
         denoise=True,
     )
     return frame.arrays["color"].astype(np.float64), reference, frame.arrays

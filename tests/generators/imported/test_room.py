@@ -18,6 +18,7 @@ from gibench.generators.imported.relighting import lit_by_area_light, lit_by_env
 from gibench.generators.imported.room import import_room, write_imported_room
 from gibench.generators.imported.scene import ImportSettings, fingerprint, import_scene
 from gibench.generators.imported.survey import survey
+from gibench.generators.imported.turning import with_meshes_turned, without_flips
 from gibench.generators.light import radiance_of
 from gibench.generators.parts import Environment, Light
 from gibench.rendering.camera import PinholeCamera
@@ -94,15 +95,64 @@ def test_walls_that_turn_their_back_are_turned_round(tmp_path):
     assert [c for c in right.changes if c.rule == "orientation"] == []
     turned = [c for c in wrong.changes if c.rule == "orientation"]
     assert [c.where for c in turned] == ["scene.xml:8"]
-    shells = [
-        next(s for s in scene.tree.root.nodes("shape") if s.get("id") == "shell") for scene in (right, wrong)
-    ]
-    assert [shell.value("flip_normals") for shell in shells] == ["true", "true"]
     assert len(found) > 100
+    shells = [next(s for s in x.loaded.mi_scene.shapes() if s.id() == "shell") for x in (right, wrong)]
+    normals = [np.sign(_seen_from_inside(shell)) for shell in shells]
+    assert normals == [1, 1]
     camera = wrong.cameras[0].at(SIZE)
     np.testing.assert_allclose(
         color(wrong.loaded, camera).mean(), color(right.loaded, camera).mean(), rtol=0.02
     )
+
+
+def _seen_from_inside(shape) -> float:
+    """Cosine between the normal of a wall and where it is seen from."""
+    import mitsuba as mi
+
+    ray = mi.Ray3f(mi.Point3f(0, 0, 1.2), mi.Vector3f(1, 0, 0))
+    si = mi.load_dict({"type": "scene", "shape": shape}).ray_intersect(ray)
+    return float(-np.array(si.n).ravel() @ [1, 0, 0])
+
+
+@pytest.mark.parametrize("flat", ["false", "true"])
+def test_a_mesh_is_turned_in_its_file(tmp_path, flat):
+    """Place, normals and texture coordinates stay, and so does what a flag had turned."""
+    sphere = trimesh.creation.icosphere(subdivisions=2)
+    from gibench.generators.parts import Mesh
+    from gibench.generators.scene_files import write_ply
+
+    uvs = sphere.vertices[:, :2] * 0.5
+    write_ply(Mesh(sphere.vertices, sphere.faces.astype(np.int32), sphere.vertices, uvs), tmp_path / "a.ply")
+    body = (
+        '<shape type="ply" id="s"><string name="filename" value="a.ply"/><boolean name="flip_normals" value="true"/>'
+        f'<boolean name="face_normals" value="{flat}"/>'
+        '<transform name="to_world"><scale x="2" y="1" z="1"/></transform></shape>'
+    )
+    scene = import_scene(written(tmp_path, body), ImportSettings(up="z"))
+    camera = PinholeCamera((0.1, -4, 1), (0, 0, 0), 0.8)
+    names = ("position", "normal", "geometric_normal", "curvature")
+
+    def arrays(scene):
+        return render_frame(scene, camera, resolution=(48, 36), channels=names).arrays
+
+    before = arrays(scene.loaded)
+    after_scene = without_flips(scene)
+    assert one(after_scene.tree.root, "shape").property("flip_normals") is None
+    after = arrays(after_scene.loaded)
+    for name in names[:3]:  # these are turned to the viewer
+        np.testing.assert_allclose(after[name], before[name], atol=2e-4, err_msg=name)
+
+    def facing(scene):
+        import mitsuba as mi
+
+        si = scene.loaded.mi_scene.ray_intersect(mi.Ray3f(mi.Point3f(0, 0, 0), mi.Vector3f(0.2, 0.3, 1)))
+        return float(np.array(si.n).ravel() @ [0.2, 0.3, 1]), np.array(si.uv).ravel()
+
+    assert facing(scene)[0] < 0
+    assert facing(after_scene)[0] < 0
+    np.testing.assert_allclose(facing(scene)[1], facing(after_scene)[1], atol=1e-5)
+    assert facing(with_meshes_turned(scene, ["s"]))[0] > 0
+    assert facing(with_meshes_turned(with_meshes_turned(scene, ["s"]), ["s"]))[0] < 0
 
 
 def test_without_views_only_its_own_cameras_are_there(tmp_path):
@@ -146,9 +196,12 @@ def test_daylight_comes_in_where_rays_go_out(tmp_path):
     scene = import_scene(file, ImportSettings(up="z")).loaded
     (opening,) = find_openings(scene, free_space(scene))
     corner, u, v = opening
-    low, high = corner, corner + u + v
-    np.testing.assert_allclose(np.minimum(low, high), (-1, 3, 1), atol=0.16)
-    np.testing.assert_allclose(np.maximum(low, high), (1, 3, 2), atol=0.16)
+    low, high = np.minimum(corner, corner + u + v), np.maximum(corner, corner + u + v)
+    # All of the window, and little more than what the walls' thickness and the size of the cells make of it.
+    assert (low <= (-1, 3.06, 1)).all()
+    assert (high >= (1, 2.94, 2)).all()
+    assert abs(corner[1] - 3) < 0.11
+    assert (high - low)[0] * (high - low)[2] < 2.2 * 2 * 1
     assert np.cross(u, v)[1] < 0  # points inside
 
 
@@ -190,13 +243,13 @@ def test_room_json_says_what_was_done(room, folder):
     assert said["source"]["scale"] == 1
     assert said["source"]["to_metres_z_up"] == np.eye(4).tolist()
     assert len(said["cameras"]) == len(room.cameras)
-    assert said["lights"] == [{"type": "area", "where": "scene.xml:14"}]
+    assert said["lights"] == [{"type": "area", "where": "scene.xml:15"}]
 
 
 def test_the_glb_has_the_same_triangles(room, folder):
     loaded = trimesh.load(folder / "room.glb")
     area = sum(float(mesh.area) for mesh in loaded.dump() if isinstance(mesh, trimesh.Trimesh))
-    known = 2 * (5 * 6 + 5 * 2.7 + 6 * 2.7)
+    known = 2 * (5 * 6 + 5 * 2.7 + 6 * 2.7) + 0.8**2
     known += sum(24 * s * s for s in (0.4, 0.45, 0.35, 0.4, 0.35, 0.45, 0.5, 0.3, 0.3, 0.3))
     assert area == pytest.approx(known, rel=1e-5)
 
@@ -263,7 +316,6 @@ def test_instances_are_copies_in_their_places(tmp_path):
 
 
 ANALYTIC = {
-    "rectangle": "",
     "disk": "",
     "sphere": '<float name="radius" value="0.8"/><point name="center" x="0.1" y="0.2" z="-0.1"/>',
     "cylinder": '<point name="p0" x="-0.5" y="0" z="-0.4"/><point name="p1" x="0.5" y="0.3" z="0.6"/>'
