@@ -9,7 +9,6 @@ it was when the recording was made.
 # mypy: disable-error-code="no-untyped-def, misc"
 from __future__ import annotations
 
-import gc
 import weakref
 from collections.abc import Callable
 from typing import Any
@@ -17,6 +16,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
+from gibench.rendering.backend import tracing
 from gibench.rendering.camera import PinholeCamera, RayGenerator
 from gibench.rendering.scene import Scene
 
@@ -45,7 +45,7 @@ class Replay:
         held: arrays, or pytrees of them, that it reads besides and that stay as they are.
         """
         portals = arrays_of(scene.portals) if scene.portals is not None else {}
-        self._held = [scene.mi_scene, portals, scene._tables, _kinds(), held]
+        self._held = [scene.mi_scene, portals, scene._tables, scene.layers.arrays, _kinds(), held]
         self._function = function
         me = weakref.ref(self)  # `dr.freeze` makes cycles of its own, which would hold the scene
 
@@ -64,13 +64,8 @@ class Replay:
 
     def __call__(self, *arguments: Any) -> Any:
         """Call the function."""
-        collecting = gc.isenabled()
-        gc.disable()  # what others have left in cycles must not die while kernels are traced either
-        try:
+        with tracing():
             return self._frozen(self._held, arguments)
-        finally:
-            if collecting:
-                gc.enable()
 
 
 def arrays_of(thing: Any) -> dict[str, Any]:

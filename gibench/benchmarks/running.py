@@ -42,14 +42,16 @@ SPENT = ("scenes", "prepare", "render", "score")
 class Order:
     """What a command asks for.
 
-    methods: with their settings, in the order in which they run. rooms, seeds: None takes the preset's. command: how
-    to do the same again, for the record and for messages.
+    methods: with their settings, in the order in which they run. rooms, seeds: None takes the preset's. scenes: keys
+    of a recipe that put scene files in the place of rooms. command: how to do the same again, for the record and for
+    messages.
     """
 
     track: Track
     preset: str
     methods: tuple[tuple[Found, tuple[Choice, ...]], ...]
     rooms: int | None = None
+    scenes: Mapping[str, Any] = field(default_factory=dict)
     seeds: tuple[int, ...] | None = None
     variant: str = "auto"
     threads: int = field(default_factory=lambda: default_threads(1))
@@ -60,6 +62,11 @@ class Order:
     def size(self) -> Preset:
         """The preset itself."""
         return self.track.preset(self.preset)
+
+    @property
+    def room_count(self) -> int:
+        """How many rooms or scenes."""
+        return len(self.scenes.get("scenes", ())) or self.rooms or self.size.rooms
 
 
 def ordered_methods(
@@ -161,18 +168,17 @@ class Run:
         if any(found.method.channels for found, _ in order.methods):
             self._make("training")
         self.spent["scenes"] += time.perf_counter() - began
-        asked = order.rooms or order.size.rooms
-        self.scenes = [s for s in scenes_in(*self.folder.references) if s.room < asked]
+        self.scenes = [s for s in scenes_in(*self.folder.references) if s.room < order.room_count]
 
     def _identity(self) -> dict[str, Any]:
         """What all results of a folder have in common. Rooms may be added."""
-        size = self.order.size
+        size, scenes = self.order.size, self.order.scenes
         return {
             "track": self.order.track.id,
             "preset": self.order.preset,
             "warmup": size.warmup,
-            "training": size.recipe("training").identity(),
-            "reference": size.recipe("reference").identity(),
+            "training": size.recipe("training", scenes=scenes).identity(),
+            "reference": size.recipe("reference", scenes=scenes).identity(),
         }
 
     def _check_identity(self) -> None:
@@ -223,12 +229,12 @@ class Run:
 
     def _make(self, which: Any) -> None:
         order = self.order
-        rooms = order.rooms or order.size.rooms
+        rooms = order.room_count
         if (manifest := self.folder.dataset(which) / "dataset.json").exists():
             from gibench.datasets.manifest import read_manifest
 
             rooms = max(rooms, int(read_manifest(manifest.parent)["recipe"]["rooms"]))
-        recipe = order.size.recipe(which, rooms)
+        recipe = order.size.recipe(which, rooms, order.scenes)
 
         def tell(progress: Progress) -> None:
             self.state.scenes = progress

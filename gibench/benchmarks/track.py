@@ -91,11 +91,15 @@ class Preset(_Strict):
         return int(self.room["path_views"])
 
     def recipe(
-        self, which: Literal["training", "reference", "reference-again"], rooms: int | None = None
+        self,
+        which: Literal["training", "reference", "reference-again"],
+        rooms: int | None = None,
+        scenes: Mapping[str, Any] | None = None,
     ) -> Recipe:
         """The recipe of the training views, or of the frames on the path, once or once more with other samples.
 
-        All make the same rooms: what decides a room and its cameras is in `room`. Raises TrackError.
+        All make the same rooms: what decides a room and its cameras is in `room`. scenes: keys of a recipe that put
+        scene files in the place of rooms. Raises TrackError.
         """
         own = self.training if which == "training" else self.reference
         values = {
@@ -106,6 +110,7 @@ class Preset(_Strict):
             "rendered": "stills" if which == "training" else "path",
             "sample_seed": int(which == "reference-again"),
             "splits": {"test": 1.0},
+            **(scenes or {}),
         }
         try:
             return check_recipe(values, source=which)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from gibench.cli import bench, dataset, doctor, stress
+from gibench.cli import bench, convert, dataset, doctor, stress
 
 app = typer.Typer(
     name="gibench",
@@ -14,6 +14,7 @@ app = typer.Typer(
 )
 app.add_typer(dataset.app, name="dataset")
 app.add_typer(bench.app, name="bench")
+app.command("convert")(convert.convert)
 app.command("doctor")(doctor.doctor)
 app.command("stress")(stress.stress)
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from gibench.cli.dataset import AllowMissing, AllowOutside, Scale, SceneFiles, UpAxis
 from gibench.errors import GibenchError
 
 if TYPE_CHECKING:
@@ -30,6 +31,11 @@ def run_track(
         str | None, typer.Option(help="Such as lightmap,path-traced.", show_default="all of the track")
     ] = None,
     rooms: Annotated[int | None, typer.Option(help="How many rooms.", show_default="the preset's")] = None,
+    scene: SceneFiles = None,
+    up: UpAxis = None,
+    scale: Scale = None,
+    allow_missing: AllowMissing = False,
+    allow_outside: AllowOutside = False,
     settings: Annotated[
         list[str] | None,
         typer.Option(
@@ -59,7 +65,7 @@ def run_track(
     from gibench.benchmarks.settings import parse_overrides
     from gibench.benchmarks.track import load_track
     from gibench.cli import bench_telling as telling
-    from gibench.cli.dataset import check_variant
+    from gibench.cli.dataset import check_variant, scene_options, scene_words
     from gibench.cli.progress import counting
 
     chosen = load_track(track)
@@ -68,6 +74,14 @@ def run_track(
     for option, value in (("--rooms", rooms), ("--equal-time", equal_time)):
         if value is not None and not value > 0:
             raise TrackError(f"{option}: {value:g} is not allowed; allowed is a number above 0")
+    if scene and rooms is not None:
+        raise TrackError("--scene takes the place of rooms: leave out --rooms")
+    scenes = {
+        key: value
+        for key, value in scene_options(scene, up, scale, allow_missing, allow_outside).items()
+        if value is not None
+    }
+    chosen.preset(preset).recipe("reference", scenes=scenes)
     found = _methods(methods, chosen.id, chosen.preset(preset).methods)
     overrides = parse_overrides(settings or (), {f.method.id: f.method for f in found})
     root = out or Path("results") / f"{chosen.id}-{preset}"
@@ -82,12 +96,14 @@ def run_track(
         "--variant": None if variant == "auto" else variant,
     }
     words = [str(word) for option, value in given.items() if value is not None for word in (option, value)]
+    words += scene_words(scene, up, scale, allow_missing, allow_outside)
     words += [word for text in settings or () for word in ("--set", text)]
     order = Order(
         track=chosen,
         preset=preset,
         methods=ordered_methods(chosen, preset, found, overrides),
         rooms=rooms,
+        scenes=scenes,
         seeds=None if seeds is None else _seeds(seeds),
         variant=variant,
         retry_failed=retry_failed,

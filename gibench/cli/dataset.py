@@ -16,6 +16,21 @@ if TYPE_CHECKING:
 
 app = typer.Typer(help="Make, check and look at datasets.", no_args_is_help=True)
 
+SceneFiles = Annotated[
+    list[Path] | None,
+    typer.Option("--scene", help="A Mitsuba scene file as a room; may be repeated.", show_default=False),
+]
+UpAxis = Annotated[
+    str | None, typer.Option(help="Axis of the scene file that is up: x, y or z.", show_default="auto")
+]
+Scale = Annotated[float | None, typer.Option(help="Metres of the scene file's unit.", show_default="1")]
+AllowMissing = Annotated[
+    bool, typer.Option("--allow-missing", help="Leave out what needs a file that is missing.")
+]
+AllowOutside = Annotated[
+    bool, typer.Option("--allow-outside", help="Read files outside the folder of the scene.")
+]
+
 Folder = Annotated[Path, typer.Argument(metavar="DIR", help="The dataset's folder.", show_default=False)]
 
 
@@ -41,6 +56,15 @@ def make(
     kind: Annotated[
         str | None, typer.Option(help="Kinds of rooms, such as living,office.", show_default="all")
     ] = None,
+    scene: SceneFiles = None,
+    up: UpAxis = None,
+    scale: Scale = None,
+    cameras: Annotated[
+        Path | None,
+        typer.Option(help="Cameras of the scene from a JSON file; none are sampled.", show_default=False),
+    ] = None,
+    allow_missing: AllowMissing = False,
+    allow_outside: AllowOutside = False,
     variant: Annotated[str, typer.Option(help="Mitsuba's, or auto: the fastest that works.")] = "auto",
     workers: Annotated[int, typer.Option(help="Processes that render at the same time.")] = 1,
     dry_run: Annotated[
@@ -48,11 +72,15 @@ def make(
         typer.Option("--dry-run", help="Build and check the rooms; keep nothing, estimate time and disk."),
     ] = False,
 ) -> None:
-    """Make a dataset of furnished rooms, or continue or extend the one that the folder holds."""
+    """Make a dataset of furnished rooms or of scenes, or continue or extend the one that the folder holds."""
     if preset is not None and recipe is not None:
         raise _usage("--preset and --recipe exclude each other: keep one of them")
     if workers < 1:
         raise _usage(f"--workers: {workers} is not allowed; allowed is an integer from 1")
+    if scene and (rooms is not None or kind is not None):
+        raise _usage("--scene takes the place of rooms: leave out --rooms and --kind")
+    if cameras is not None and views is None:
+        views = 0
     asked = {
         "rooms": rooms,
         "seed": seed,
@@ -62,6 +90,8 @@ def make(
         "error": error,
         "channels": None if channels is None else names_in(channels, "--channels"),
         "kinds": None if kind is None else names_in(kind, "--kind"),
+        "cameras": None if cameras is None else str(cameras),
+        **scene_options(scene, up, scale, allow_missing, allow_outside),
     }
     chosen = _recipe(preset, recipe, {key: value for key, value in asked.items() if value is not None})
     check_variant(variant)
@@ -72,7 +102,7 @@ def make(
         estimate_and_tell(chosen, variant, workers)
         return
     given = {
-        "--rooms": chosen.rooms,
+        "--rooms": None if chosen.scenes else chosen.rooms,
         "--out": root,
         "--preset": preset,
         "--recipe": recipe,
@@ -83,10 +113,12 @@ def make(
         "--error": error,
         "--channels": channels,
         "--kind": kind,
+        "--cameras": cameras,
         "--variant": None if variant == "auto" else variant,
         "--workers": None if workers == 1 else workers,
     }
     words = [str(word) for option, value in given.items() if value is not None for word in (option, value)]
+    words += scene_words(scene, up, scale, allow_missing, allow_outside)
     from gibench.cli.making import make_and_tell
 
     make_and_tell(root, chosen, variant, workers, shlex.join(["make-dataset", *words]))
@@ -147,6 +179,38 @@ def preview(
     except OSError as problem:
         raise GibenchError(f"{path} cannot be written: {problem.strerror}") from None
     typer.echo(str(path))
+
+
+def scene_options(
+    scenes: list[Path] | None,
+    up: str | None,
+    scale: float | None,
+    allow_missing: bool,
+    allow_outside: bool,
+) -> dict[str, Any]:
+    """Keys of a recipe for the options of imported scenes; None where an option was not given."""
+    return {
+        "scenes": tuple(map(str, scenes)) if scenes else None,
+        "up": up,
+        "scale": scale,
+        "allow_missing": allow_missing or None,
+        "allow_outside": allow_outside or None,
+    }
+
+
+def scene_words(
+    scenes: list[Path] | None,
+    up: str | None,
+    scale: float | None,
+    allow_missing: bool,
+    allow_outside: bool,
+) -> list[str]:
+    """The same options as words of a command line."""
+    words = [word for scene in scenes or () for word in ("--scene", str(scene))]
+    words += [] if up is None else ["--up", up]
+    words += [] if scale is None else ["--scale", repr(scale)]
+    words += ["--allow-missing"] if allow_missing else []
+    return words + (["--allow-outside"] if allow_outside else [])
 
 
 def _recipe(preset: str | None, recipe: Path | None, overrides: dict[str, Any]) -> Recipe:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -9,8 +10,12 @@ import typer
 
 from gibench.cli.progress import amount, counting, duration, making
 from gibench.datasets.estimating import estimate
+from gibench.datasets.folder import room_folder, whole_rooms
 from gibench.datasets.making import make
 from gibench.datasets.recipes import Recipe
+
+#: Rewrites of scene files that change names alone; they are counted.
+QUIET_RULES = ("property_names", "transform_tags")
 
 
 def make_and_tell(root: Path, recipe: Recipe, variant: str, workers: int, command: str) -> None:
@@ -23,8 +28,8 @@ def make_and_tell(root: Path, recipe: Recipe, variant: str, workers: int, comman
         typer.echo(f"{root} is already complete")
     describe(root, summary.manifest)
     if summary.made:
-        frames = summary.made * len(recipe.rendered_views())
-        typer.echo(_row("this run", f"{duration(summary.seconds)}, {summary.seconds / frames:.2f} s a frame"))
+        seconds = summary.seconds / max(summary.frames, 1)
+        typer.echo(_row("this run", f"{duration(summary.seconds)}, {seconds:.2f} s a frame"))
         typer.echo(_row("look at it", f"{root / 'preview.png'}"))
 
 
@@ -53,6 +58,8 @@ def describe(root: Path, manifest: dict[str, Any]) -> None:
         if totals["invalid_paths"]:
             typer.echo(_row("invalid paths", f"{totals['invalid_paths']}, counted as 0"))
     _tell_rejections(manifest.get("rejections", {}), manifest["rejected_rooms"])
+    if recipe.get("scenes"):
+        _tell_scenes(root)
     versions = manifest["versions"]
     typer.echo(
         _row(
@@ -76,6 +83,26 @@ def dry_run(recipe: Recipe, variant: str, workers: int) -> None:
     typer.echo(_row("time", f"{most}{duration(result.seconds)} ({result.variant}, {speed})"))
     typer.echo(_row("disk", f"about {amount(result.bytes, 'B')}"))
     typer.echo("Time and disk are scaled from one small frame of a first room; nothing was kept.")
+
+
+def _tell_scenes(root: Path) -> None:
+    for room in whole_rooms(root):
+        tell_scene(json.loads((room_folder(root, room) / "room.json").read_text(encoding="utf-8")))
+
+
+def tell_scene(described: dict[str, Any]) -> None:
+    """Say what was done to an imported scene, from its room.json, which holds all of it."""
+    source = described["source"]
+    changes = sum(change["count"] for change in source["changes"])
+    placed = f"{source['up']} up" + ("" if source["scale"] == 1 else f", scale {source['scale']:g}")
+    typer.echo(_row("scene", f"{described['kind']}: {placed}, {changes} changes"))
+    for warning in source["warnings"]:
+        typer.echo(_row("", f"warning: {warning}"))
+    for change in source["changes"]:
+        if change["loss"] or change["rule"] not in QUIET_RULES:
+            times = "" if change["count"] == 1 else f" ({change['count']} times)"
+            mark = "warning: " if change["loss"] else ""
+            typer.echo(_row("", f"{mark}{change['what']}{times}"))
 
 
 def _tell_rejections(rejections: dict[str, int], rooms: dict[Any, str]) -> None:

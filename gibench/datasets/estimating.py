@@ -8,13 +8,16 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gibench.datasets import exr, pool
 from gibench.datasets.making import default_threads
 from gibench.datasets.recipes import Recipe
-from gibench.datasets.room_making import Renderer, rendered_frame, sampled_room
+from gibench.datasets.room_making import Renderer, given_cameras, rendered_frame, sampled_room, written_room
 from gibench.generators.parts import Room
+
+if TYPE_CHECKING:
+    from gibench.generators.imported.room import ImportedRoom
 
 #: The frame that is measured: at most this wide, and at most this many samples a pixel, which are one pass of the
 #: renderer. Fewer would count what a pass costs at any size, such as tracing Python, as if each path cost it.
@@ -25,9 +28,10 @@ MEASURED_WIDTH, MEASURED_SPP = 256, 64
 class Estimate:
     """What a dataset would take on this machine.
 
-    rooms, rejected_rooms, rejections: counted, not estimated (rejections: reason → count over rooms and
-    views). build_seconds: per room, measured on all rooms. paths_per_second, seconds_per_frame,
-    bytes_per_room, bytes_per_frame: scaled from one measured frame. seconds: wall time of the whole making.
+    rooms, frames, rejected_rooms, rejections: counted, not estimated (frames: of the rooms that could be built;
+    rejections: reason → count over rooms and views). build_seconds: per room, measured on all rooms.
+    paths_per_second, seconds_per_frame, bytes_per_room, bytes_per_frame: scaled from one measured frame. seconds: wall
+    time of the whole making.
     With a recipe that stops at an error, samples are taken to reach the cap, so that seconds are the most
     that it can take.
     """
@@ -35,6 +39,7 @@ class Estimate:
     recipe: Recipe
     workers: int
     rooms: int = 0
+    frames: int = 0
     variant: str = ""
     rejected_rooms: dict[int, str] = field(default_factory=dict)
     rejections: Counter[str] = field(default_factory=Counter)
@@ -44,11 +49,6 @@ class Estimate:
     bytes_per_room: float = 0.0
     bytes_per_frame: float = 0.0
     load_seconds: float = 0.0
-
-    @property
-    def frames(self) -> int:
-        """Number of frames of the rooms that could be built."""
-        return self.rooms * len(self.recipe.rendered_views())
 
     @property
     def bytes(self) -> float:
@@ -70,7 +70,7 @@ class RoomChecker:
     has_measured: bool = False
 
     def __call__(self, room: int, report: pool.Report) -> dict[str, Any]:
-        """Return "rejections" and "seconds", "measured" once a worker, or "rejected": reason."""
+        """Return "frames", "rejections" and "seconds", "measured" once a worker, or "rejected": reason."""
         from gibench.generators.rooms import RejectedRoom
 
         started = time.perf_counter()
@@ -81,10 +81,15 @@ class RoomChecker:
         seconds = time.perf_counter() - started
         measured = None if self.has_measured else self._measured(built)
         self.has_measured = True
-        return {"rejections": dict(built.rejections), "seconds": seconds, "measured": measured}
+        frames = len(self.recipe.rendered_views(given_cameras(self.recipe, room)))
+        return {
+            "frames": frames,
+            "rejections": dict(built.rejections),
+            "seconds": seconds,
+            "measured": measured,
+        }
 
-    def _measured(self, room: Room) -> dict[str, float]:
-        from gibench.generators.scene_files import write_room
+    def _measured(self, room: Room | ImportedRoom) -> dict[str, float]:
         from gibench.rendering.scene import load_scene
 
         recipe = self.recipe
@@ -97,7 +102,7 @@ class RoomChecker:
         }
         with tempfile.TemporaryDirectory(prefix="gibench-") as scratch:
             started = time.perf_counter()
-            write_room(room, scratch)
+            written_room(room, Path(scratch), recipe)
             scene = load_scene(Path(scratch) / "scene.xml", share_kernels=True)
             load_seconds = time.perf_counter() - started
             size = sum(file.stat().st_size for file in Path(scratch).rglob("*") if file.is_file())
@@ -139,6 +144,7 @@ def estimate(
             result.rejected_rooms[room] = answer["rejected"]
         else:
             result.rooms += 1
+            result.frames += answer["frames"]
             result.rejections.update(answer["rejections"])
             build_seconds.append(answer["seconds"])
         if answer.get("measured"):

@@ -19,7 +19,7 @@ from gibench.datasets import manifest as manifests
 from gibench.datasets.errors import Interrupted, MakingError
 from gibench.datasets.previews import contact_sheet, write_picture
 from gibench.datasets.recipes import Recipe
-from gibench.datasets.room_making import Renderer, RoomMaker, machine
+from gibench.datasets.room_making import Renderer, RoomMaker, given_cameras, machine
 
 
 @dataclass
@@ -46,11 +46,12 @@ class Progress:
 class Summary:
     """What there is after a run. totals: as in `dataset.json`. seconds: wall time of this run.
 
-    made: rooms that this run made; 0 where the dataset was complete already.
+    made: rooms that this run made; 0 where the dataset was complete already. frames: that it rendered.
     """
 
     root: Path
     made: int
+    frames: int
     seconds: float
     manifest: dict[str, Any]
 
@@ -108,7 +109,8 @@ def make(
             raise MakingError(_why(root, problem)) from None
         assert run.manifest is not None
         made = run.progress.rooms_done - run.progress.rooms_before
-        return Summary(root, made, time.perf_counter() - started, run.manifest)
+        frames = run.progress.frames_done - run.progress.frames_before
+        return Summary(root, made, frames, time.perf_counter() - started, run.manifest)
 
 
 def _why(root: Path, problem: OSError) -> str:
@@ -134,15 +136,17 @@ class _Run:
         if (root / folder.MANIFEST).exists():
             self.manifest = manifests.read_manifest(root)
             manifests.refuse_other(root, self.manifest, recipe)
-        whole, frames = folder.whole_rooms(root), len(recipe.rendered_views())
+        whole = folder.whole_rooms(root)
+        frames = [len(recipe.rendered_views(given_cameras(recipe, room))) for room in range(recipe.rooms)]
+        frames_before = sum(frames[room] for room in whole if room < len(frames))
         self.frames_of: Counter[int] = Counter()
         self.progress = Progress(
             rooms=recipe.rooms,
-            frames=recipe.rooms * frames,
+            frames=sum(frames),
             rooms_before=len(whole),
-            frames_before=len(whole) * frames,
+            frames_before=frames_before,
             rooms_done=len(whole),
-            frames_done=len(whole) * frames,
+            frames_done=frames_before,
         )
         rejected = {int(room): why for room, why in (self.manifest or {}).get("rejected_rooms", {}).items()}
         self.progress.rejected_rooms.update(rejected)

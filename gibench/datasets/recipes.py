@@ -7,7 +7,7 @@ import tomllib
 from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 from pydantic_core import PydanticCustomError
@@ -15,11 +15,22 @@ from pydantic_core import PydanticCustomError
 from gibench.datasets.errors import RecipeError, nearest
 from gibench.rendering import channels as contract
 
+if TYPE_CHECKING:
+    from gibench.generators.imported.scene import ImportSettings
+
 #: Environments that are no file: what `sample_room` would choose itself, sun and sky, or darkness outside.
 ENVIRONMENTS = ("auto", "sunsky", "none")
 
+#: SPDX's way to say: that of the scenes, whose licence files lie beside them in the dataset.
+SCENE_LICENCE = "LicenseRef-of-the-scene"
+
 #: Options of the commands whose name is not the key that they override.
-OPTIONS = {"kinds": "--kind"}
+OPTIONS = {
+    "kinds": "--kind",
+    "scenes": "--scene",
+    "allow_missing": "--allow-missing",
+    "allow_outside": "--allow-outside",
+}
 
 # Lists in TOML become tuples here: a recipe is a value that can be compared and hashed.
 Names = Annotated[tuple[str, ...], Field(strict=False, min_length=1)]
@@ -36,7 +47,12 @@ class Recipe(BaseModel):
     rooms: int = Field(10, ge=1, le=10**6, description="an integer from 1 to 1000000")
     seed: int = Field(0, ge=0, lt=2**63, description="an integer from 0 to 2⁶³−1")
     kinds: Names = Field(("all",), validate_default=True, description='a list of room kinds, or ["all"]')
-    views: int = Field(4, ge=1, le=9999, description="an integer from 1 to 9999 (frames a room)")
+    views: int = Field(
+        4,
+        ge=0,
+        le=9999,
+        description="an integer from 1 to 9999 (frames a room), or 0 for the cameras that scenes bring along",
+    )
     resolution: Annotated[
         tuple[Annotated[int, Field(ge=8, le=16384)], Annotated[int, Field(ge=8, le=16384)]],
         Field(strict=False),
@@ -83,6 +99,16 @@ class Recipe(BaseModel):
         {"train": 0.8, "validation": 0.1, "test": 0.1},
         description="a table of names and shares from 0 to 1 that sum to 1",
     )
+    scenes: Annotated[tuple[str, ...], Field(strict=False)] = Field(
+        (), description="a list of Mitsuba scene files, each a room in place of a generated one"
+    )
+    up: Literal["auto", "x", "y", "z"] = Field(
+        "auto", description='"auto", "x", "y" or "z" (the axis of scene files that is up)'
+    )
+    scale: float = Field(1.0, gt=0, le=1e6, description="a number above 0 (metres of a scene file's unit)")
+    allow_missing: bool = Field(False, description="true or false (leave out what needs a missing file)")
+    allow_outside: bool = Field(False, description="true or false (read files outside of a scene's folder)")
+    cameras: str | None = Field(None, description="the path of a camera file for the scenes (JSON)")
     licence: str = Field("CC0-1.0", min_length=1, description="the SPDX name of the licence of the data")
 
     @model_validator(mode="before")
@@ -91,6 +117,14 @@ class Recipe(BaseModel):
         """Take 64 samples where the recipe sets neither `spp` nor `error`."""
         if isinstance(values, dict) and values.get("spp") is None and values.get("error") is None:
             return {**values, "spp": 64}
+        return values
+
+    @model_validator(mode="before")
+    @classmethod
+    def _a_room_a_scene(cls, values: Any) -> Any:
+        if isinstance(values, dict) and isinstance(scenes := values.get("scenes"), list | tuple) and scenes:
+            # What is rendered of a scene stays under the terms of its author.
+            return {"licence": SCENE_LICENCE, **values, "rooms": len(scenes)}
         return values
 
     @model_validator(mode="after")
@@ -113,10 +147,34 @@ class Recipe(BaseModel):
             )
         return self
 
-    def rendered_views(self) -> range:
-        """Numbers of the views of a room that are rendered: stills first, then those on the path beside them."""
-        first = self.views if self.rendered == "path" else 0
-        return range(first, self.views if self.rendered == "stills" else self.views + self.path_views)
+    @model_validator(mode="after")
+    def _scenes_that_can_be(self) -> Self:
+        if not self.scenes:
+            for key in ("up", "scale", "allow_missing", "allow_outside", "cameras"):
+                if getattr(self, key) != type(self).model_fields[key].default:
+                    raise PydanticCustomError(
+                        "scenes", "{key} is set, but only scenes have it: set scenes too", {"key": key}
+                    )
+            if self.views == 0:
+                raise PydanticCustomError(
+                    "views",
+                    "0 is not allowed: only scenes have cameras of their own; allowed is an integer from 1",
+                )
+        elif self.environment != "auto":
+            raise PydanticCustomError(
+                "scenes", "environment is set, but scenes bring their own: leave it out"
+            )
+        return self
+
+    def rendered_views(self, given: int = 0) -> range:
+        """Numbers of the views of a room that are rendered.
+
+        First come the cameras that it brings along, `given` of them, which count as stills; then the stills, then those
+        on the path beside them.
+        """
+        stills = given + self.views
+        first = stills if self.rendered == "path" else 0
+        return range(first, stills if self.rendered == "stills" else stills + self.path_views)
 
     @field_validator("kinds")
     @classmethod
@@ -148,8 +206,8 @@ class Recipe(BaseModel):
     def identity(self) -> dict[str, Any]:
         """Return the recipe as JSON-able values without the number of rooms, which alone may grow.
 
-        An environment file counts by its content (SHA-256), not by where it lies. Raises `RecipeError` when
-        it cannot be read.
+        Files count by their content (SHA-256), not by where they lie. Raises `RecipeError` or `SceneFileError` for one
+        that cannot be read.
         """
         values = self.model_dump(mode="json", exclude={"rooms"})
         # Datasets that were begun before these keys existed hold the same frames.
@@ -159,7 +217,25 @@ class Recipe(BaseModel):
             del values["sample_seed"]
         if self.environment not in ENVIRONMENTS:
             values["environment"] = f"sha256:{file_sha256(Path(self.environment))}"
+        if self.scenes:
+            from gibench.generators.imported.scene import fingerprint
+
+            settings = self.import_settings()
+            values["scenes"] = [f"sha256:{fingerprint(Path(scene), settings)}" for scene in self.scenes]
+            del values["kinds"]
+            if self.cameras is not None:
+                values["cameras"] = f"sha256:{file_sha256(Path(self.cameras))}"
+        else:
+            for key in ("scenes", "up", "scale", "allow_missing", "allow_outside", "cameras"):
+                del values[key]
         return values
+
+    def import_settings(self) -> ImportSettings:
+        """How the scene files are read."""
+        from gibench.generators.imported.scene import ImportSettings
+
+        cameras = None if self.cameras is None else Path(self.cameras)
+        return ImportSettings(self.up, self.scale, self.allow_missing, self.allow_outside, cameras)
 
 
 def file_sha256(path: Path) -> str:
@@ -188,8 +264,8 @@ def load_preset(name: str, overrides: Mapping[str, Any] | None = None) -> Recipe
 def load_recipe(path: Path, overrides: Mapping[str, Any] | None = None) -> Recipe:
     """Load a recipe from a TOML file; keys that it leaves out take their defaults.
 
-    overrides: option → value, as given on the command line; they win over the file. A relative `environment`
-    path counts from the file's folder. Raises `RecipeError` with the file, the key and what is allowed.
+    overrides: option → value, as given on the command line; they win over the file. Relative paths in it count from
+    its folder. Raises `RecipeError` with the file, the key and what is allowed.
     """
     try:
         values = tomllib.loads(path.read_text(encoding="utf-8"))
@@ -200,6 +276,12 @@ def load_recipe(path: Path, overrides: Mapping[str, Any] | None = None) -> Recip
     environment = values.get("environment")
     if isinstance(environment, str) and environment not in ENVIRONMENTS:
         values["environment"] = str((path.parent / environment).resolve())
+    if isinstance(scenes := values.get("scenes"), list):
+        values["scenes"] = [
+            str((path.parent / scene).resolve()) for scene in scenes if isinstance(scene, str)
+        ]
+    if isinstance(cameras := values.get("cameras"), str):
+        values["cameras"] = str((path.parent / cameras).resolve())
     return check_recipe(values, source=str(path), overrides=overrides)
 
 
@@ -230,6 +312,11 @@ def _validated(values: dict[str, Any], source: str, options: frozenset[str] = fr
     if recipe.environment not in ENVIRONMENTS and not Path(recipe.environment).is_file():
         near = nearest(recipe.environment, ENVIRONMENTS)
         raise RecipeError(f"{source}: environment: there is no file {recipe.environment}; {near}")
+    for scene in recipe.scenes:
+        if not Path(scene).is_file():
+            raise RecipeError(f"{_place('scenes', source, options)}: there is no scene file {scene}")
+    if recipe.cameras is not None and not Path(recipe.cameras).is_file():
+        raise RecipeError(f"{_place('cameras', source, options)}: there is no camera file {recipe.cameras}")
     return recipe
 
 
@@ -242,14 +329,21 @@ def _message(
             source = "options"
         elif problem["type"] == "single" and "spp" in options:
             source = "--spp"
+        elif problem["type"] == "views":
+            source = _place("views", source, options)
         return f"{source}: {problem['msg']}"
     key = str(problem["loc"][0])
     if problem["type"] == "extra_forbidden":
         return f"{source}: unknown key '{key}'; {nearest(key, Recipe.model_fields)}"
-    place = OPTIONS.get(key, f"--{key}") if key in options else f"{source}: {key}"
+    place = _place(key, source, options)
     if problem["type"] == "unknown":
         return f"{place}: {problem['msg']}"
     reason = f" ({problem['msg']})" if problem["type"] == "splits" else ""
     return (
         f"{place}: {values[key]!r} is not allowed{reason}; allowed is {Recipe.model_fields[key].description}"
     )
+
+
+def _place(key: str, source: str, options: frozenset[str]) -> str:
+    """What an error calls the place that a key's value came from."""
+    return OPTIONS.get(key, f"--{key}") if key in options else f"{source}: {key}"

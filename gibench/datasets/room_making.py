@@ -13,7 +13,7 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -27,6 +27,7 @@ from gibench.datasets.splits import split_of
 from gibench.generators.parts import Camera, Room
 
 if TYPE_CHECKING:
+    from gibench.generators.imported.room import ImportedRoom
     from gibench.rendering.render import RenderedFrame
 
 #: Lane of the random numbers that rendering draws; far above those that the generators spawn for a room.
@@ -75,8 +76,30 @@ def frame_seed(recipe: Recipe, room: int, view: int) -> int:
     return int(np.random.SeedSequence(recipe.seed, spawn_key=lane).generate_state(1)[0])
 
 
-def sampled_room(recipe: Recipe, room: int) -> Room:
-    """Build room number `room` of a recipe; nothing is written. Raises `RejectedRoom`."""
+def given_cameras(recipe: Recipe, room: int) -> int:
+    """How many cameras room number `room` brings along: 0 but for imported scenes. Raises `SceneFileError`."""
+    if not recipe.scenes:
+        return 0
+    from gibench.generators.imported.scene import import_scene
+
+    return len(import_scene(Path(recipe.scenes[room]), recipe.import_settings()).cameras)
+
+
+def sampled_room(recipe: Recipe, room: int) -> Room | ImportedRoom:
+    """Build or import room number `room` of a recipe; nothing is written. Raises `RejectedRoom`, `SceneFileError`."""
+    if recipe.scenes:
+        from gibench.generators.imported.room import import_room
+        from gibench.generators.imported.scene import import_scene
+
+        return import_room(
+            import_scene(Path(recipe.scenes[room]), recipe.import_settings()),
+            resolution=recipe.resolution,
+            seed=recipe.seed,
+            index=room,
+            views=recipe.views,
+            path=None if recipe.path == "stills" else recipe.path,
+            path_views=recipe.path_views,
+        )
     from gibench.generators.rooms import sample_room
 
     return sample_room(
@@ -90,7 +113,27 @@ def sampled_room(recipe: Recipe, room: int) -> Room:
     )
 
 
-def rendered_frame(recipe: Recipe, scene: Any, room: Room, view: int, **settings: Any) -> RenderedFrame:
+def written_room(room: Room | ImportedRoom, folder: Path, recipe: Recipe) -> None:
+    """Write everything of a room but its frames."""
+    settings: dict[str, Any] = {
+        # Mitsuba counts segments, of which there is one more than scattering events.
+        "max_depth": recipe.max_depth + 1,
+        "resolution": recipe.resolution,
+        "spp": recipe.spp or recipe.spp_cap,
+    }
+    if recipe.scenes:
+        from gibench.generators.imported.room import write_imported_room
+
+        write_imported_room(cast("ImportedRoom", room), folder, **settings)
+    else:
+        from gibench.generators.scene_files import write_room
+
+        write_room(cast(Room, room), folder, **settings)
+
+
+def rendered_frame(
+    recipe: Recipe, scene: Any, room: Room | ImportedRoom, view: int, **settings: Any
+) -> RenderedFrame:
     """Render one view of a room with a recipe's settings, or with other `settings` of `render_frame`."""
     from gibench.rendering.camera import PinholeCamera
     from gibench.rendering.render import render_frame
@@ -154,21 +197,13 @@ class RoomMaker:
         return record
 
     def _filled(self, folder: Path, number: int, report: Callable[[str, Any], None]) -> dict[str, Any]:
-        from gibench.generators.scene_files import write_room
         from gibench.rendering.scene import load_scene
 
         recipe = self.recipe
         clock = Stopwatch()
         room = sampled_room(recipe, number)
         clock.lap("build")
-        write_room(
-            room,
-            folder,
-            # Mitsuba counts segments, of which there is one more than scattering events.
-            max_depth=recipe.max_depth + 1,
-            resolution=recipe.resolution,
-            spp=recipe.spp or recipe.spp_cap,
-        )
+        written_room(room, folder, recipe)
         clock.lap("write")
         scene = load_scene(folder / "scene.xml", share_kernels=True)
         clock.lap("load")
@@ -178,11 +213,12 @@ class RoomMaker:
             if path.is_file()
         }
         (folder / "frames").mkdir()
+        given = given_cameras(recipe, number)
         frames: list[Future[dict[str, Any]]] = []
         # Compressing and writing a frame goes on while the next one renders. One frame at most waits for it,
         # so memory does not grow with the number of views.
         with ThreadPoolExecutor(max_workers=1) as writer:
-            for view in self.recipe.rendered_views():
+            for view in recipe.rendered_views(given):
                 rendered = rendered_frame(recipe, scene, room, view)
                 report("frame", {"paths": rendered.paths, "seconds": rendered.kernel_seconds})
                 if frames:
@@ -194,6 +230,7 @@ class RoomMaker:
             "room": number,
             "kind": room.kind,
             "split": split_of(number, recipe.splits),
+            "given_cameras": given,
             "materials": list(scene.materials),
             "shapes": list(scene.shapes),
             "rejections": dict(room.rejections),
@@ -202,7 +239,9 @@ class RoomMaker:
             "files": files,
         }
 
-    def _stored(self, folder: Path, room: Room, view: int, rendered: RenderedFrame) -> dict[str, Any]:
+    def _stored(
+        self, folder: Path, room: Room | ImportedRoom, view: int, rendered: RenderedFrame
+    ) -> dict[str, Any]:
         from gibench.metrics import reference_exposure
 
         try:

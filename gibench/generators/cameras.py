@@ -17,7 +17,7 @@ from scipy.interpolate import CubicSpline
 from gibench.errors import GibenchError
 from gibench.generators.parts import Camera, FloatArray
 from gibench.generators.view_checks import View, judge
-from gibench.generators.visibility import RayCaster
+from gibench.generators.visibility import Caster
 
 HEIGHTS = (1.2, 1.8)  # of the camera above the floor, m
 FOV = (math.radians(50), math.radians(90))  # horizontal field of view
@@ -51,11 +51,12 @@ class Stage:
         free: shapely.Geometry,
         height: float,
         things: FloatArray,
-        caster: RayCaster,
+        caster: Caster,
         shell_owners: int,
+        floor: float = 0.0,
     ) -> None:
-        """height: of the room, metres."""
-        self.free, self.height, self.things = free, height, things
+        """height: of the room, floor: where its floor lies, metres."""
+        self.free, self.height, self.things, self.floor = free, height, things, floor
         self.caster, self.shell_owners = caster, shell_owners
         shapely.prepare(self.free)
 
@@ -102,7 +103,7 @@ def sample_stills(
 
 def _candidate(rng: np.random.Generator, stage: Stage, xy: FloatArray) -> Camera:
     """A camera at a point, turned to something far enough to show its surroundings."""
-    z = rng.uniform(HEIGHTS[0], min(HEIGHTS[1], stage.height - 0.4))
+    z = stage.floor + rng.uniform(HEIGHTS[0], min(HEIGHTS[1], stage.height - 0.4))
     away = np.hypot(*(stage.things[:, :2] - xy).T)
     weights = np.clip(away - 0.8, 0.05, 3.0)
     aim = stage.things[int(rng.choice(len(weights), p=weights / weights.sum()))]
@@ -151,7 +152,7 @@ def sample_path(
             refused[f"{kind}: no free curve"] += 1
             continue
         xy, yaw = drawn
-        z = float(rng.uniform(HEIGHTS[0] + 0.2, min(HEIGHTS[1], stage.height - 0.5)))
+        z = stage.floor + float(rng.uniform(HEIGHTS[0] + 0.2, min(HEIGHTS[1], stage.height - 0.5)))
         fov = float(rng.uniform(math.radians(65), FOV[1]))
         pitch = float(rng.normal(-0.12, 0.05))
         cameras = [

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 import struct
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -25,10 +26,11 @@ VERTICES, INDICES = 34962, 34963  # glTF buffer targets
 Y_UP = [-math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)]  # quaternion from Z up to glTF's Y up
 
 
-class _Document:
+class GlbDocument:
     """A glTF document that grows by meshes, materials and images."""
 
     def __init__(self) -> None:
+        """An empty one."""
         self.chunks: list[bytes] = []
         self.size = 0
         self.views: list[dict[str, Any]] = []
@@ -62,6 +64,11 @@ class _Document:
         self.accessors.append(entry)
         return len(self.accessors) - 1
 
+    def image(self, content: bytes, mime: str) -> int:
+        """Append a PNG or JPEG and return the number of the texture that shows it."""
+        self.images.append({"bufferView": self.view(content), "mimeType": mime})
+        return len(self.images) - 1
+
     def primitive(self, mesh: Mesh, tile: tuple[float, float], material: int) -> dict[str, Any]:
         """One mesh with its metric UVs divided by what a tile of its texture covers, metres."""
         return {
@@ -74,10 +81,39 @@ class _Document:
             "material": material,
         }
 
+    def save(self, path: Path, things: Mapping[str, list[dict[str, Any]]]) -> None:
+        """Write the file. things: name → primitives."""
+        count = len(things)
+        gltf = {
+            "asset": {"version": "2.0", "generator": "gibench"},
+            "scene": 0,
+            "scenes": [{"nodes": [count]}],
+            "nodes": [
+                *({"name": name, "mesh": number} for number, name in enumerate(things)),
+                {"name": "room", "rotation": Y_UP, "children": list(range(count))},
+            ],
+            "meshes": [{"name": n, "primitives": p} for n, p in things.items()],
+            "materials": self.materials,
+            "accessors": self.accessors,
+            "bufferViews": self.views,
+            "buffers": [{"byteLength": self.size}],
+        }
+        if self.images:
+            gltf["images"] = self.images
+            gltf["samplers"] = [{"wrapS": 10497, "wrapT": 10497}]
+            gltf["textures"] = [{"source": i, "sampler": 0} for i in range(len(self.images))]
+        text = json.dumps(gltf, separators=(",", ":")).encode()
+        text += b" " * (-len(text) % 4)
+        with path.open("wb") as file:
+            file.write(struct.pack("<4sII", b"glTF", 2, 28 + len(text) + self.size))
+            file.write(struct.pack("<I4s", len(text), b"JSON") + text)
+            file.write(struct.pack("<I4s", self.size, b"BIN\0"))
+            file.writelines(self.chunks)
+
 
 def write_glb(room: Room, folder: Path) -> None:
     """Write room.glb into a folder whose textures/ already holds the PNGs of the room's materials."""
-    document = _Document()
+    document = GlbDocument()
     numbers: dict[str, int] = {}
     for name, material in room.materials.items():
         numbers[name] = len(document.materials)
@@ -95,35 +131,10 @@ def write_glb(room: Room, folder: Path) -> None:
         document.materials.append(_emissive(light))
         meshes.append([document.primitive(light_mesh(light), (1.0, 1.0), len(document.materials) - 1)])
         names.append(light.name)
-    count = len(meshes)
-    gltf = {
-        "asset": {"version": "2.0", "generator": "gibench"},
-        "scene": 0,
-        "scenes": [{"nodes": [count]}],
-        "nodes": [
-            *({"name": name, "mesh": number} for number, name in enumerate(names)),
-            {"name": "room", "rotation": Y_UP, "children": list(range(count))},
-        ],
-        "meshes": [{"name": n, "primitives": p} for n, p in zip(names, meshes, strict=True)],
-        "materials": document.materials,
-        "accessors": document.accessors,
-        "bufferViews": document.views,
-        "buffers": [{"byteLength": document.size}],
-    }
-    if document.images:
-        gltf["images"] = document.images
-        gltf["samplers"] = [{"wrapS": 10497, "wrapT": 10497}]
-        gltf["textures"] = [{"source": i, "sampler": 0} for i in range(len(document.images))]
-    text = json.dumps(gltf, separators=(",", ":")).encode()
-    text += b" " * (-len(text) % 4)
-    with (folder / "room.glb").open("wb") as file:
-        file.write(struct.pack("<4sII", b"glTF", 2, 28 + len(text) + document.size))
-        file.write(struct.pack("<I4s", len(text), b"JSON") + text)
-        file.write(struct.pack("<I4s", document.size, b"BIN\0"))
-        file.writelines(document.chunks)
+    document.save(folder / "room.glb", dict(zip(names, meshes, strict=True)))
 
 
-def _material(document: _Document, material: Material, folder: Path) -> dict[str, Any]:
+def _material(document: GlbDocument, material: Material, folder: Path) -> dict[str, Any]:
     metal = material.bsdf in ("conductor", "roughconductor")
     surface: dict[str, Any] = {
         "metallicFactor": 1.0 if metal else 0.0,
@@ -132,8 +143,7 @@ def _material(document: _Document, material: Material, folder: Path) -> dict[str
     }
     if isinstance(material.reflectance, Texture):
         png = (folder / "textures" / f"{material.name}.png").read_bytes()
-        document.images.append({"bufferView": document.view(png), "mimeType": "image/png"})
-        surface["baseColorTexture"] = {"index": len(document.images) - 1}
+        surface["baseColorTexture"] = {"index": document.image(png, "image/png")}
     else:
         surface["baseColorFactor"] = [*(min(1.0, c) for c in base_color(material)), 1.0]
     return {"name": material.name, "pbrMetallicRoughness": surface, "doubleSided": True}

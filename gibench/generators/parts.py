@@ -24,6 +24,7 @@ class Mesh:
     vertices: (V, 3) float64, metres. faces: (F, 3) int32, counter-clockwise seen from outside.
     normals: (V, 3) float64, unit, outward. uvs: (V, 2) float64, in metres along the surface (metric UVs: one
     unit of u or v covers one metre), so that a texture of known size has the same grain on everything.
+    normals and uvs are empty where a mesh has none, which those of generators never are.
     Merging vertices of equal position gives a closed surface, except where a generator says otherwise.
     """
 

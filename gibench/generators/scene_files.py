@@ -7,6 +7,7 @@ published is what was rendered.
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
@@ -63,27 +64,31 @@ def write_room(
 
 
 def write_ply(mesh: Mesh, path: Path, *, tile: tuple[float, float] = (1.0, 1.0)) -> None:
-    """Write a mesh as binary little-endian PLY with float32 positions, normals and UVs.
+    """Write a mesh as PLY; see `ply_bytes`."""
+    path.write_bytes(ply_bytes(mesh, tile=tile))
+
+
+def ply_bytes(mesh: Mesh, *, tile: tuple[float, float] = (1.0, 1.0)) -> bytes:
+    """A mesh as binary little-endian PLY with float32 positions, normals and UVs, where it has these.
 
     tile: metres that the texture's tile covers; UVs are divided by it. Scaling them here rather than by a transform
     of each texture keeps materials alike, so that Dr.Jit compiles one kernel for them all, and for the next room.
     """
-    fields = ("x", "y", "z", "nx", "ny", "nz", "u", "v")
+    columns = {"x y z": mesh.vertices, "nx ny nz": mesh.normals, "u v": mesh.uvs / tile}
+    columns = {names: values for names, values in columns.items() if len(values) == len(mesh.vertices)}
     lines = [
         "ply",
         "format binary_little_endian 1.0",
         f"element vertex {len(mesh.vertices)}",
-        *(f"property float {name}" for name in fields),
+        *(f"property float {name}" for names in columns for name in names.split()),
         f"element face {len(mesh.faces)}",
         "property list uchar int vertex_indices",
         "end_header\n",
     ]
     faces = np.empty(len(mesh.faces), dtype=[("count", "u1"), ("corners", "<i4", 3)])
     faces["count"], faces["corners"] = 3, mesh.faces
-    vertices = np.concatenate(
-        [mesh.vertices, mesh.normals, mesh.uvs / tile], 1, dtype="<f4", casting="same_kind"
-    )
-    path.write_bytes("\n".join(lines).encode("ascii") + vertices.tobytes() + faces.tobytes())
+    vertices = np.concatenate(list(columns.values()), 1, dtype="<f4", casting="same_kind")
+    return "\n".join(lines).encode("ascii") + vertices.tobytes() + faces.tobytes()
 
 
 def scene_element(
@@ -97,7 +102,7 @@ def scene_element(
     integrator = SubElement(scene, "integrator", type="path")
     SubElement(integrator, "integer", name="max_depth", value=str(max_depth))
     for number, camera in enumerate(room.cameras):
-        scene.append(_sensor(camera, f"camera.{number}", resolution, spp))
+        scene.append(sensor_element(camera, f"camera.{number}", resolution, spp))
     for material in room.materials.values():
         textured = isinstance(material.reflectance, Texture)
         scene.append(bsdf_xml(material, f"textures/{material.name}.png" if textured else None))
@@ -107,7 +112,7 @@ def scene_element(
             SubElement(shape, "string", name="filename", value=f"meshes/{thing.name}.{number}.ply")
             SubElement(shape, "ref", id=material_name)
     for light in room.lights:
-        scene.append(_emitter(light))
+        scene.append(light_element(light))
     if outside is not None:
         # Lamps outnumber the sky, which would leave it few samples; half of them suit both.
         SubElement(outside, "float", name="sampling_weight", value=str(max(1, len(room.lights))))
@@ -121,7 +126,8 @@ def _number(value: float) -> str:
     return repr(float(value))
 
 
-def _sensor(camera: Camera, name: str, resolution: tuple[int, int], spp: int) -> Element:
+def sensor_element(camera: Camera, name: str, resolution: tuple[int, int], spp: int) -> Element:
+    """The `<sensor>` of a camera. resolution: (width, height) of its film."""
     sensor = Element("sensor", type="perspective", id=name)
     SubElement(sensor, "string", name="fov_axis", value="x")
     SubElement(sensor, "float", name="fov", value=_number(np.degrees(camera.fov)))
@@ -142,7 +148,8 @@ def _sensor(camera: Camera, name: str, resolution: tuple[int, int], spp: int) ->
     return sensor
 
 
-def _emitter(light: Light) -> Element:
+def light_element(light: Light) -> Element:
+    """The `<shape>` of a lamp's light, which refers to the material LAMP_MATERIAL."""
     shape = Element("shape", type=light.shape, id=light.name)
     if light.shape == "sphere":
         x, y, z = (_number(c) for c in light.centre)
@@ -200,18 +207,23 @@ def describe(room: Room) -> dict[str, Any]:
             }
             for name, material in room.materials.items()
         },
-        "cameras": [
-            {
-                "position": _plain(camera.position),
-                "target": _plain(camera.target),
-                "fov": float(camera.fov),
-                "path": camera.path,
-                "step": int(camera.step),
-            }
-            for camera in room.cameras
-        ],
+        "cameras": camera_records(room.cameras),
         "rejections": dict(sorted(room.rejections.items())),
     }
+
+
+def camera_records(cameras: Sequence[Camera]) -> list[dict[str, Any]]:
+    """What room.json says of cameras."""
+    return [
+        {
+            "position": _plain(camera.position),
+            "target": _plain(camera.target),
+            "fov": float(camera.fov),
+            "path": camera.path,
+            "step": int(camera.step),
+        }
+        for camera in cameras
+    ]
 
 
 def _plain(value: Any) -> Any:

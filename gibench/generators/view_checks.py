@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gibench.generators.parts import Camera, FloatArray
-from gibench.generators.visibility import RayCaster
+from gibench.generators.visibility import Caster
 from gibench.rendering.camera import PinholeCamera
 
 GRID = (24, 18)  # rays across and down, at the aspect of the usual 4:3 frame
@@ -47,7 +47,7 @@ def camera_rays(cameras: Sequence[Camera], grid: tuple[int, int] = GRID) -> Floa
     return rays.reshape(len(cameras), -1, 3)
 
 
-def judge(caster: RayCaster, cameras: Sequence[Camera], shell_owners: int) -> list[View]:
+def judge(caster: Caster, cameras: Sequence[Camera], shell_owners: int) -> list[View]:
     """Cast the grids of all candidates at once and judge each.
 
     shell_owners: owners below this number are the shell's and do not count as things seen.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,15 @@ from gibench.generators.parts import FloatArray, IntArray, Mesh
 from gibench.rendering.backend import select_variant
 
 Surface = tuple[FloatArray, IntArray]  # vertices (V, 3), metres, and faces (F, 3)
+
+
+class Caster(Protocol):
+    """What tells which thing a ray meets first."""
+
+    def cast(
+        self, origins: FloatArray, directions: FloatArray
+    ) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+        """As `RayCaster.cast`."""
 
 
 class RayCaster:

@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import gc
 import importlib.metadata
 import logging
 import os
 import platform
 import re
 import sys
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
@@ -213,6 +215,33 @@ def limit_threads(count: int) -> None:
     import drjit as dr
 
     dr.set_thread_count(count)
+
+
+@contextlib.contextmanager
+def tracing() -> Iterator[None]:
+    """Nothing that others left in reference cycles dies in here: a scene that does while a kernel is traced, aborts."""
+    collecting = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collecting:
+            gc.enable()
+
+
+@contextlib.contextmanager
+def threads_to_load() -> Iterator[None]:
+    """Two threads at least while Mitsuba reads files: with one alone its reader of OpenEXR waits for ever."""
+    import drjit as dr
+
+    count = dr.thread_count()
+    if count < 2:
+        dr.set_thread_count(2)
+    try:
+        yield
+    finally:
+        if count < 2:
+            dr.set_thread_count(count)
 
 
 def versions() -> dict[str, str]:

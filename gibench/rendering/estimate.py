@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gibench.errors import GibenchError
-from gibench.rendering.backend import is_scalar
+from gibench.rendering.backend import is_scalar, tracing
 from gibench.rendering.camera import PinholeCamera, RayGenerator
 from gibench.rendering.channels import PARTS
 from gibench.rendering.scene import Scene
@@ -155,6 +155,7 @@ def _launch(scene: Scene, generator: RayGenerator, block: _Block) -> _Launched:
         max_depth=block.max_depth,
         guides=block.guides,
         portals=scene.portals,
+        layers=scene.layers,
     )
 
     parts = {name: getattr(path, name) for name in PARTS}
@@ -209,7 +210,14 @@ def _launch_scalar(scene: Scene, generator: RayGenerator, block: _Block) -> _Lau
         corner = mi.Point2f((block.first_pixel + p) % block.width, (block.first_pixel + p) // block.width)
         for s in range(block.samples):
             rays = generator.rays(corner + sampler.next_2d())
-            path = trace_paths(scene.mi_scene, sampler, rays, max_depth=block.max_depth, guides=block.guides)
+            path = trace_paths(
+                scene.mi_scene,
+                sampler,
+                rays,
+                max_depth=block.max_depth,
+                guides=block.guides,
+                layers=scene.layers,
+            )
             values[:, p, s] = [np.array(getattr(path, name)) for name in names]
     finite = np.isfinite(values).all(axis=(0, -1))
     values[:, ~finite] = 0
@@ -247,7 +255,8 @@ def _add(
         )
         start = time.perf_counter()
         block = _Block(resolution[0], first, count, samples, estimate.levels, number, max_depth, guides)
-        launched = launch(scene, generator, block)
+        with tracing():
+            launched = launch(scene, generator, block)
         estimate.seconds += time.perf_counter() - start
         estimate.invalid += launched.invalid
         for name, value in launched.parts.items():

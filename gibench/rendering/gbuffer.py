@@ -163,9 +163,9 @@ def render_gbuffer(
             "geometric_normal": lambda: hit.facing(hit.si.n),
             "depth": lambda: hit.masked(hit.si.t * dr.dot(hit.rays.d, generator.forward)),
             "distance": lambda: hit.masked(hit.si.t),
-            "albedo": lambda: surface.albedo(hit.bsdf, hit.si, hit.valid),
-            "specular_albedo": lambda: surface.specular_albedo(hit.bsdf, hit.si, hit.valid),
-            "roughness": lambda: surface.roughness(hit.bsdf, hit.si, hit.valid),
+            "albedo": lambda: surface.albedo(scene, hit.bsdf, hit.si, hit.valid),
+            "specular_albedo": lambda: surface.specular_albedo(scene, hit.bsdf, hit.si, hit.valid),
+            "roughness": lambda: surface.roughness(scene, hit.bsdf, hit.si, hit.valid),
             "material_id": lambda: scene.material_ids(hit.bsdf, hit.valid),
             "shape_id": lambda: scene.shape_ids(hit.si.shape, hit.valid),
         }
@@ -174,7 +174,7 @@ def render_gbuffer(
             names |= {
                 "reflected_position": lambda: mirror.masked(mirror.si.p),
                 "reflected_normal": lambda: mirror.normal,
-                "reflected_albedo": lambda: surface.albedo(mirror.bsdf, mirror.si, mirror.valid),
+                "reflected_albedo": lambda: surface.albedo(scene, mirror.bsdf, mirror.si, mirror.valid),
                 "reflected_distance": lambda: mirror.masked(mirror.si.t),
                 "reflected_material_id": lambda: scene.material_ids(mirror.bsdf, mirror.valid),
                 "reflected_shape_id": lambda: scene.shape_ids(mirror.si.shape, mirror.valid),

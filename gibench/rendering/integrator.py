@@ -89,6 +89,47 @@ def shading_normal(si):
     return dr.mulsign(si.sh_frame.n, dr.dot(si.sh_frame.n, si.n))
 
 
+def _principled_diffuse(bsdf, si, wo, active):
+    """The diffuse lobe of `principled` alone, cosine included (Burley 2012, section 5.3; flatness: 2015, section 5.2).
+
+    si, wo: turned to the front. Sheen and coats are other lobes.
+    """
+    number = lambda name: bsdf.eval_attribute_1(name, si, active & bsdf.has_attribute(name, active))  # noqa: E731
+    rough = number("roughness")
+    matte = (1 - number("metallic")) * (1 - number("spec_trans")) * (1 - 0.5 * number("diff_trans"))
+    cos_i, cos_o = dr.maximum(si.wi.z, 0), dr.maximum(wo.z, 0)
+    grazing_i, grazing_o = ((1 - c) ** 5 for c in (cos_i, cos_o))
+    half = dr.dot(dr.normalize(si.wi + wo), wo)
+    retro = 2 * rough * dr.square(half)
+    lobe = (1 - 0.5 * grazing_i) * (1 - 0.5 * grazing_o)
+    lobe += retro * (grazing_o + grazing_i + grazing_o * grazing_i * (retro - 1))
+    inner = dr.lerp(1, 0.5 * retro, grazing_o) * dr.lerp(1, 0.5 * retro, grazing_i)
+    flat = 1.25 * (inner * (_inverse(cos_i + cos_o) - 0.5) + 0.5)
+    base = bsdf.eval_attribute("base_color", si, active)
+    value = base * matte * dr.lerp(lobe, flat, number("flatness")) * cos_o * dr.inv_pi
+    return dr.select(active & (cos_i > 0) & (cos_o > 0), value, 0)
+
+
+def _diffuse_lobe(layers, bsdf, context, si, wo, active):
+    """The diffuse reflection of a material, cosine included.
+
+    `principled` evaluates all of its lobes whichever it is asked for, so what it adds is put right by hand.
+    """
+    value = bsdf.eval(context, si, wo, active)
+    if layers is None or not layers.principled:
+        return value
+    front = mi.SurfaceInteraction3f(si)
+    front.wi = mi.Vector3f(si.wi.x, si.wi.y, dr.abs(si.wi.z))
+    wo = mi.Vector3f(wo.x, wo.y, dr.mulsign(wo.z, si.wi.z))
+    excess = mi.Spectrum(0)
+    for part in layers.parts(bsdf, si, active)[0]:
+        on = active & (part.weight > 0)
+        on &= part.bsdf.has_attribute("base_color", on)
+        all_lobes = part.bsdf.eval(context, front, wo, on)
+        excess += dr.select(on, part.weight * (all_lobes - _principled_diffuse(part.bsdf, front, wo, on)), 0)
+    return dr.clip(value - excess, 0, value)
+
+
 def _emission(scene, si, active):
     emitter = si.emitter(scene)
     # None only in the scalar variant, where an array of pointers would hold a null.
@@ -206,17 +247,28 @@ def _indirect(scene, portals, sampler, ray, reference, pdf, delta, weight, eta, 
 
 
 def scatter_paths(
-    scene, sampler, si, bsdf, active, *, max_depth: int, lobes: str = "all", portals: Any = None
+    scene,
+    sampler,
+    si,
+    bsdf,
+    active,
+    *,
+    max_depth: int,
+    lobes: str = "all",
+    portals: Any = None,
+    layers: Any = None,
 ) -> PathSample:
     """Traces one path a lane from points that light is reflected at, and sorts what they send along si.wi.
 
     scene: mitsuba.Scene. sampler: from `sampling`. si: mi.SurfaceInteraction3f, bsdf: its material. max_depth: largest
     number of scattering events, that at si included. lobes: "all"; "diffuse" or "specular" reflect by that lobe
-    alone, with all samples, and leave the other at 0. portals: `Scene.portals`, for less noise by daylight. emission
-    of the result is 0.
+    alone, with all samples, and leave the other at 0. portals: `Scene.portals`, for less noise by daylight. layers:
+    `Scene.layers`, without which all of `principled` counts as diffuse. emission of the result is 0.
     """
+    by_hand = layers is not None and layers.principled
     mask = {"all": int(mi.BSDFFlags.All), "diffuse": int(_DIFFUSE), "specular": NOT_DIFFUSE}[lobes]
-    asked = mi.BSDFContext(mi.TransportMode.Radiance, mask)
+    # What ignores the mask is sampled whole and taken apart.
+    asked = mi.BSDFContext(mi.TransportMode.Radiance, int(mi.BSDFFlags.All) if by_hand else mask)
     diffuse = mi.BSDFContext(mi.TransportMode.Radiance, int(_DIFFUSE))
     active = active & si.is_valid() & ((bsdf.flags() & mask) != 0) & (max_depth >= 1)
 
@@ -233,13 +285,18 @@ def scatter_paths(
 
     delta = mi.has_flag(bounce.sampled_type, mi.BSDFFlags.Delta)
     none = mi.Spectrum(0)
-    if lobes == "all":
-        value_diffuse, value_other = _split(bsdf, value, bsdf.eval(diffuse, si, to_light, lit))
-        smooth = active & (delta ^ True) & (bounce.pdf > 0)
-        bounce_diffuse = bsdf.eval(diffuse, si, bounce.wo, smooth) * dr.select(
-            smooth, _inverse(bounce.pdf), 0
+    if lobes == "all" or by_hand:
+        value_diffuse, value_other = _split(
+            bsdf, value, _diffuse_lobe(layers, bsdf, diffuse, si, to_light, lit)
         )
+        smooth = active & (delta ^ True) & (bounce.pdf > 0)
+        bounce_diffuse = _diffuse_lobe(layers, bsdf, diffuse, si, bounce.wo, smooth)
+        bounce_diffuse *= dr.select(smooth, _inverse(bounce.pdf), 0)
         weight_diffuse, weight_other = _split(bsdf, weight, bounce_diffuse)
+        if lobes == "diffuse":
+            value_other, weight_other = none, none
+        elif lobes == "specular":
+            value_diffuse, weight_diffuse = none, none
     elif lobes == "diffuse":
         value_diffuse, value_other, weight_diffuse, weight_other = value, none, weight, none
     else:
@@ -269,17 +326,26 @@ def scatter_paths(
 
 
 def trace_paths(
-    scene, sampler, ray, *, max_depth: int, guides: bool = False, portals: Any = None
+    scene,
+    sampler,
+    ray,
+    *,
+    max_depth: int,
+    guides: bool = False,
+    portals: Any = None,
+    layers: Any = None,
 ) -> PathSample:
     """Traces one path a lane and sorts its radiance.
 
     scene: mitsuba.Scene. sampler: from `sampling`. ray: mi.Ray3f. max_depth: largest number of scattering events, ≥ 0
     (Mitsuba's `path` counts segments: its max_depth is one more). guides: whether first-hit albedo and normal are
-    returned too. portals: `Scene.portals`, for less noise by daylight.
+    returned too. portals, layers: those of the `Scene`, as for `scatter_paths`.
     """
     si = scene.ray_intersect(ray, mi.RayFlags.All, True)
     bsdf = bsdf_at(si, ray)
-    result = scatter_paths(scene, sampler, si, bsdf, mi.Bool(True), max_depth=max_depth, portals=portals)
+    result = scatter_paths(
+        scene, sampler, si, bsdf, mi.Bool(True), max_depth=max_depth, portals=portals, layers=layers
+    )
     result.emission = _emission(scene, si, True)
     if guides:
         # On a conductor this is a value of its lobe and may exceed 1; the denoiser wants [0, 1].

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gibench.errors import GibenchError
-from gibench.rendering.backend import is_scalar, select_variant
+from gibench.rendering.backend import is_scalar, select_variant, threads_to_load
 from gibench.rendering.kernel_sharing import spare_plugins
 
 OPENINGS = "openings.json"
@@ -63,6 +63,14 @@ class Scene:
         from gibench.rendering.portals import Portals
 
         return Portals(self.mi_scene, self.openings)
+
+    @cached_property
+    def layers(self) -> Any:
+        """`layers.Layers` of the materials."""
+        from gibench.rendering.layers import Layers
+
+        bsdfs = {id(bsdf): bsdf for shape in self.mi_scene.shapes() if (bsdf := shape.bsdf()) is not None}
+        return Layers(list(bsdfs.values()))
 
     def material_ids(self, bsdf: Any, active: Any) -> Any:
         """Ids (from 1) of an array of BSDF pointers; 0 where not `active`."""
@@ -154,7 +162,8 @@ def load_scene(path: str | Path, *, share_kernels: bool = False) -> Scene:
         raise SceneError(f"there is no scene file {path}")
     try:
         # Mitsuba would merge shapes that share a material, and their ids with them.
-        scene = wrap(mi.load_file(str(path), optimize=False))
+        with threads_to_load():
+            scene = wrap(mi.load_file(str(path), optimize=False))
     except RuntimeError as error:
         reason = " ".join(str(error).split())
         raise SceneError(f"Mitsuba refuses {path}: {reason}") from error

@@ -12,7 +12,12 @@ MEASURED = {
 
 
 def estimated(recipe, **measured):
-    answer = {"rejections": {"view: too close": 2}, "seconds": 0.25, "measured": {**MEASURED, **measured}}
+    answer = {
+        "frames": len(recipe.rendered_views()),
+        "rejections": {"view: too close": 2},
+        "seconds": 0.25,
+        "measured": {**MEASURED, **measured},
+    }
     return estimate(recipe, work=Work(Answer({"variant": "fake"}), Answer(answer)))
 
 

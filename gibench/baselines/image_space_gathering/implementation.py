@@ -29,7 +29,7 @@ def _gbuffer(scene, lightmap, camera, width: int, height: int):
         "reflectance": directional_albedo(hits.si, hits.bsdf, glossy),
         "position": mi.Point3f(hits.si.p),
         "normal": dr.mulsign(hits.si.sh_frame.n, hits.si.wi.z),
-        "roughness": surface.roughness(hits.bsdf, hits.si, glossy),
+        "roughness": surface.roughness(scene, hits.bsdf, hits.si, glossy),
         "cosine": dr.abs(hits.si.wi.z),
     }
     dr.eval(hits.preliminary, seen, surfaces)

@@ -145,6 +145,7 @@ def _launch(points, begin, number, start, size, samples, max_depth, seed):
         max_depth=max_depth,
         lobes="diffuse",
         portals=points.scene.portals,
+        layers=points.scene.layers,
     )
     light = path.direct_diffuse + path.indirect_diffuse
     tells = [dr.isfinite(value) & (over > BLACK) for value, over in zip(light, lobe, strict=True)]

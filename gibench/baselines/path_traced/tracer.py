@@ -48,6 +48,7 @@ def trace_rows(scene: Scene, camera, seed, first, width, pixels: int, spp: int) 
         max_depth=MAX_DEPTH,
         guides=True,
         portals=scene.portals,
+        layers=scene.layers,
     )
     values: dict[str, Any] = {
         "emission": path.emission,

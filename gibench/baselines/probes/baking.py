@@ -153,6 +153,7 @@ class _Baker:
             max_depth=MAX_DEPTH,
             lobes="specular",
             portals=self.scene.portals,
+            layers=self.scene.layers,
         )
         value = path.direct_specular + path.indirect_specular
         value = dr.select(dr.all(dr.isfinite(value)), value * share, 0)
@@ -172,9 +173,11 @@ class _Baker:
             values: dict[str, Callable[[], Any]] = {
                 "distance": lambda: hit.masked(hit.si.t),
                 "normal": lambda: list(hit.normal),
-                "roughness": lambda: surface.roughness(hit.bsdf, hit.si, hit.valid),
+                "roughness": lambda: surface.roughness(self.scene, hit.bsdf, hit.si, hit.valid),
                 "material_id": lambda: self.scene.material_ids(hit.bsdf, hit.valid),
-                "specular_albedo": lambda: list(surface.specular_albedo(hit.bsdf, hit.si, hit.valid)),
+                "specular_albedo": lambda: list(
+                    surface.specular_albedo(self.scene, hit.bsdf, hit.si, hit.valid)
+                ),
                 "reflected_position": lambda: list(mirror.masked(mirror.si.p)),
                 "reflected_material_id": lambda: self.scene.material_ids(mirror.bsdf, mirror.valid),
             }

@@ -25,7 +25,7 @@ def _gbuffer(scene, lightmap, camera, width: int, height: int, denoised: bool):
     guides = {}
     if denoised:
         # The albedo of the layer that is denoised: the texture of a coated wood is not in its reflections.
-        tint = surface.specular_albedo(hits.bsdf, hits.si, hits.active)
+        tint = surface.specular_albedo(scene, hits.bsdf, hits.si, hits.active)
         normal = dr.select(hits.active, dr.mulsign(hits.si.sh_frame.n, hits.si.wi.z), 0)
         guides = {"albedo": mi.Color3f(dr.clip(tint, 0, 1)), "normal": mi.Color3f(normal)}
     dr.eval(hits.preliminary, seen, guides)

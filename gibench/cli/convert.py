@@ -1,0 +1,37 @@
+"""`gibench convert`: a scene file of any age as a folder that Mitsuba 3 opens."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gibench.cli.dataset import AllowMissing, AllowOutside, Scale, UpAxis
+
+
+def convert(
+    scene: Annotated[Path, typer.Argument(metavar="SCENE", help="A Mitsuba scene file.", show_default=False)],
+    out: Annotated[Path, typer.Option(help="A new folder.", show_default=False)],
+    up: UpAxis = None,
+    scale: Scale = None,
+    allow_missing: AllowMissing = False,
+    allow_outside: AllowOutside = False,
+) -> None:
+    """Write a scene for Mitsuba 3: Z up, metres, with all its files, and say what was changed."""
+    from gibench.cli.making import tell_scene
+    from gibench.generators.imported.errors import SceneFileError
+    from gibench.generators.imported.room import describe, import_room, write_imported_room
+    from gibench.generators.imported.scene import ImportSettings, import_scene
+
+    settings = ImportSettings(up or "auto", 1.0 if scale is None else scale, allow_missing, allow_outside)
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise SceneFileError(f"{out} is there already: choose a new folder with --out")
+    read = import_scene(scene, settings)
+    room = import_room(read, resolution=read.resolution, views=0 if read.cameras else 1)
+    try:
+        write_imported_room(room, out, max_depth=read.max_depth, resolution=read.resolution, spp=64)
+    except OSError as problem:
+        raise SceneFileError(f"{problem.filename or out}: {problem.strerror}") from None
+    tell_scene(describe(room))
+    typer.echo(str(out / "scene.xml"))

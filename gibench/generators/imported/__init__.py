@@ -1,0 +1,1 @@
+"""Imported scenes: Mitsuba XML of any age, brought to Z-up metres, with cameras like those of a generated room."""

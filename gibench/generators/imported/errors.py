@@ -1,0 +1,9 @@
+"""The named error of imported scenes."""
+
+from __future__ import annotations
+
+from gibench.errors import GibenchError
+
+
+class SceneFileError(GibenchError):
+    """A scene file that cannot be imported. The message says what is wrong, where in the file, and what to do."""

@@ -1,0 +1,189 @@
+"""An imported scene as a room: with its cameras, and on disk like one that was generated."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import ElementTree, SubElement, indent
+
+import numpy as np
+
+from gibench.generators.cameras import NoView, sample_path, sample_stills
+from gibench.generators.imported.errors import SceneFileError
+from gibench.generators.imported.glb import write_scene_glb
+from gibench.generators.imported.placing import placed_matrix
+from gibench.generators.imported.reading import Node
+from gibench.generators.imported.scene import ImportedScene
+from gibench.generators.parts import Camera, FloatArray
+from gibench.generators.scene_files import camera_records, sensor_element
+from gibench.rendering.scene import OPENINGS
+
+STILLS, PATH = 3000, 3001
+"""Lanes of the random numbers, far from those of generated rooms."""
+
+
+@dataclass(frozen=True, eq=False)
+class ImportedRoom:
+    """A scene with its cameras: its own first, then stills, then those on a path.
+
+    index: number in its dataset. openings: (N, 3, 3) rectangles that daylight enters by, as far as they were found.
+    rejections: reason → count, of views.
+    """
+
+    seed: int
+    index: int
+    scene: ImportedScene
+    cameras: tuple[Camera, ...]
+    openings: FloatArray = field(default_factory=lambda: np.zeros((0, 3, 3)))
+    rejections: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def kind(self) -> str:
+        """Name of the scene."""
+        return self.scene.name
+
+
+def import_room(
+    scene: ImportedScene,
+    *,
+    resolution: tuple[int, int],
+    seed: int = 0,
+    index: int = 0,
+    views: int = 4,
+    path: str | None = None,
+    path_views: int = 0,
+) -> ImportedRoom:
+    """Choose the cameras of a scene: its own, `views` stills, and a path of `path_views`.
+
+    With a path and no path_views the `views` lie on the path, as in `rooms.sample_room`. The cameras that are drawn
+    depend on the seed and the scene alone.
+
+    Raises SceneFileError where no view passes the checks, or where there is none at all.
+    """
+    from gibench.rendering.backend import is_scalar, select_variant
+
+    select_variant()  # before anything loads Mitsuba, so that it finds the right LLVM
+    from gibench.generators.imported.openings import find_openings
+    from gibench.generators.imported.orientation import oriented
+    from gibench.generators.imported.turning import without_flips
+    from gibench.rendering.free_space import NoFreeSpace
+
+    found, why_none = np.zeros((0, 3)), "the variant scalar_rgb is too slow to look for one"
+    if not is_scalar():
+        try:
+            scene, found = oriented(scene)
+        except NoFreeSpace as problem:
+            why_none = str(problem)
+    scene = without_flips(scene)
+    openings = find_openings(scene.loaded, found) if len(found) else np.zeros((0, 3, 3))
+    cameras = [camera.at(resolution) for camera in scene.cameras]
+    rejections: Counter[str] = Counter()
+    stills = views if path is None or path_views else 0
+    on_path = (path_views or views) if path is not None else 0
+    if stills or on_path:
+        from gibench.generators.imported.survey import survey
+
+        if not len(found):
+            raise SceneFileError(
+                f"{scene.tree.file}: no place for a camera: {why_none}; give cameras with --cameras"
+            )
+        stage = survey(scene.loaded, found)
+        try:
+            if stills:
+                drawn, refused = sample_stills(_rng(seed, STILLS), stage, stills)
+                cameras += drawn
+                rejections.update({f"view: {reason}": count for reason, count in refused.items()})
+            if on_path:
+                assert path is not None
+                drawn, refused = sample_path(_rng(seed, PATH), stage, path, on_path)
+                cameras += drawn
+                rejections.update({f"view: {reason}": count for reason, count in refused.items()})
+        except NoView as refusal:
+            worst = ", ".join(f"{reason} {count}" for reason, count in refusal.reasons.most_common(3))
+            raise SceneFileError(
+                f"{scene.tree.file}: no {refusal.what} passed the view checks ({worst}); is --scale right? Or give "
+                "cameras with --cameras"
+            ) from None
+    if not cameras:
+        raise SceneFileError(
+            f"{scene.tree.file}: the scene has no camera of its own: ask for some with --views"
+        )
+    return ImportedRoom(seed, index, scene, tuple(cameras), openings, dict(rejections))
+
+
+def _rng(seed: int, lane: int) -> np.random.Generator:
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(lane,)))
+
+
+def write_imported_room(
+    room: ImportedRoom, folder: str | Path, *, max_depth: int, resolution: tuple[int, int], spp: int
+) -> None:
+    """Write scene.xml, meshes/, textures/, openings.json, room.glb and room.json, as `scene_files.write_room` does."""
+    folder = Path(folder)
+    for name in ("meshes", "textures"):
+        (folder / name).mkdir(parents=True, exist_ok=True)
+    for source, name in room.scene.files.items():
+        if isinstance(source, str):
+            (folder / name).write_bytes(room.scene.tree.made[source])
+            continue
+        try:
+            shutil.copyfile(source, folder / name)
+        except FileNotFoundError:
+            raise SceneFileError(f"{source} was there when the scene was read, and is gone") from None
+    for terms in sorted(room.scene.tree.folder.glob("LICEN[CS]E*")):
+        if terms.is_file():
+            shutil.copyfile(terms, folder / terms.name)
+    element = scene_element(room, max_depth=max_depth, resolution=resolution, spp=spp)
+    indent(element, "  ")
+    ElementTree(element).write(folder / "scene.xml", encoding="utf-8", xml_declaration=True)
+    write_scene_glb(room.scene, folder / "room.glb")
+    if len(room.openings):
+        (folder / OPENINGS).write_text(json.dumps(room.openings.tolist()) + "\n", encoding="utf-8")
+    text = json.dumps(describe(room), indent=1, allow_nan=False, ensure_ascii=False)
+    (folder / "room.json").write_text(text + "\n", encoding="utf-8")
+
+
+def scene_element(room: ImportedRoom, *, max_depth: int, resolution: tuple[int, int], spp: int) -> Node:
+    """The `<scene>` of a room, with file names relative to its folder."""
+    source = room.scene.with_files()
+    element = Node("scene", {"version": "3.0.0"})
+    integrator = SubElement(element, "integrator", type="path")
+    SubElement(integrator, "integer", name="max_depth", value=str(max_depth))
+    for number, camera in enumerate(room.cameras):
+        element.append(sensor_element(camera, f"camera.{number}", resolution, spp))
+    element.extend(source.nodes())
+    return element
+
+
+def describe(room: ImportedRoom) -> dict[str, Any]:
+    """What room.json holds, JSON-able: where the scene came from and everything that was done to it."""
+    scene = room.scene
+    groups: dict[tuple[str, str, bool], list[str]] = {}
+    for change in scene.changes:
+        groups.setdefault((change.rule, change.what, change.loss), []).append(change.where)
+    emitters = [node for node in scene.tree.root.everything() if node.tag == "emitter"]
+    return {
+        "seed": room.seed,
+        "index": room.index,
+        "kind": room.kind,
+        "source": {
+            "file": scene.tree.file.name,
+            "up": scene.up,
+            "scale": scene.scale,
+            "to_metres_z_up": placed_matrix(scene.up, scene.scale).tolist(),
+            "missing": list(scene.missing),
+            "warnings": list(scene.warnings),
+            "changes": [
+                {"rule": rule, "what": what, "loss": loss, "count": len(places), "first": places[0]}
+                for (rule, what, loss), places in groups.items()
+            ],
+        },
+        "lights": [{"type": node.type, "where": node.where} for node in emitters],
+        "cameras": camera_records(room.cameras),
+        "rejections": dict(sorted(room.rejections.items())),
+    }

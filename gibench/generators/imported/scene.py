@@ -1,0 +1,204 @@
+"""A scene file imported: read, upgraded, placed, its files found."""
+
+from __future__ import annotations
+
+import hashlib
+import tempfile
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from xml.etree.ElementTree import tostring
+
+from gibench.generators.imported.analytic import mesh_shapes
+from gibench.generators.imported.channels import single_channels
+from gibench.generators.imported.errors import SceneFileError
+from gibench.generators.imported.files import destinations, named_files, settle_missing
+from gibench.generators.imported.own_cameras import GivenCamera, cameras_of, read_camera_file
+from gibench.generators.imported.placing import place, placed_matrix, up_axis
+from gibench.generators.imported.reading import Node, SceneTree, copied, read_tree
+from gibench.generators.imported.shapes import (
+    check_references,
+    expand_instances,
+    name_everything,
+)
+from gibench.generators.imported.upgrading import Change, is_legacy, upgrade
+
+if TYPE_CHECKING:
+    from gibench.rendering.scene import Scene
+
+
+DEFAULT_SIZE = (768, 576)
+"""Mitsuba's, of a film."""
+
+DEFAULT_DEPTH = -1
+"""Mitsuba's, of a path tracer: no limit."""
+
+
+@dataclass(frozen=True)
+class ImportSettings:
+    """How scene files are read.
+
+    up: axis of the file that is up: "x", "y", "z" or "auto" (`placing.up_axis`). scale: metres of its unit.
+    allow_missing: leave out what needs a missing file. allow_outside: read files outside the scene's folder. cameras:
+    a camera file (`own_cameras.read_camera_file`).
+    """
+
+    up: str = "auto"
+    scale: float = 1.0
+    allow_missing: bool = False
+    allow_outside: bool = False
+    cameras: Path | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class ImportedScene:
+    """A scene in Z-up metres that Mitsuba 3 reads.
+
+    name: that of its folder, or of its file where that says more. tree: the scene, its file names as in the source. up,
+    scale: what was done to it. cameras: its own, then those of the camera file. resolution: (width, height) of its
+    first film; max_depth: of its integrator, as Mitsuba counts. changes: what was rewritten, missing: files that were
+    left out, as the scene names them. files: file → name in a room's folder.
+    """
+
+    name: str
+    tree: SceneTree
+    up: str
+    scale: float
+    cameras: tuple[GivenCamera, ...]
+    resolution: tuple[int, int]
+    max_depth: int
+    changes: tuple[Change, ...]
+    missing: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
+    files: Mapping[Path | str, str] = field(default_factory=dict)
+
+    @cached_property
+    def loaded(self) -> Scene:
+        """The scene under Mitsuba's current variant. Raises SceneFileError with Mitsuba's reason."""
+        from gibench.rendering.backend import select_variant, threads_to_load
+
+        select_variant()
+        import mitsuba as mi
+
+        from gibench.rendering.scene import wrap
+
+        # Mitsuba reads files alone, and only while it loads.
+        with tempfile.TemporaryDirectory(prefix="gibench-") as scratch:
+            for name, content in self.tree.made.items():
+                (Path(scratch) / name).write_bytes(content)
+
+            def absolute(source: Path | str) -> str:
+                return f"{scratch}/{source}" if isinstance(source, str) else str(source.resolve())
+
+            text = tostring(self._with_files(absolute), "unicode")
+            try:
+                with threads_to_load():
+                    return wrap(mi.load_string(text, optimize=False))
+            except RuntimeError as problem:
+                reason = " ".join(str(problem).split())
+                raise SceneFileError(f"Mitsuba refuses {self.tree.file}: {reason}") from None
+
+    def with_files(self) -> Node:
+        """A copy of the scene whose file names are those of a room's folder."""
+        return self._with_files(lambda source: self.files[source])
+
+    def _with_files(self, named: Callable[[Path | str], str]) -> Node:
+        copy = replace(self.tree, root=copied(self.tree.root))
+        for _, name, source in named_files(copy):
+            name.set("value", named(source))
+        return copy.root
+
+
+def import_scene(file: Path, settings: ImportSettings | None = None) -> ImportedScene:
+    """Import a Mitsuba scene file of any version from 0.5 on.
+
+    Raises SceneFileError for whatever is wrong with it, its files or the settings.
+    """
+    settings = settings or ImportSettings()
+    tree = read_tree(file, allow_outside=settings.allow_outside)
+    legacy = is_legacy(tree.root)
+    changes = upgrade(tree)
+
+    def note(rule: str) -> Any:
+        def take(node: Node, what: str, loss: bool = False) -> None:
+            changes.append(Change(rule, what, node.where, loss))
+
+        return take
+
+    check_references(tree.root)
+    missing = settle_missing(tree, allow_missing=settings.allow_missing)
+    single_channels(tree, note("channels"), legacy=legacy)
+    expand_instances(tree.root, note("instances"))
+    name_everything(tree.root)
+    mesh_shapes(tree, note("analytic"))
+    if not tree.root.nodes("shape"):
+        raise SceneFileError(f"{file}: the scene has no shape, so there is nothing to see")
+    up = up_axis(tree.root, settings.up)
+    place(tree.root, up, settings.scale)
+    cameras = cameras_of(tree.root, note("cameras"))
+    if settings.cameras is not None:
+        cameras += read_camera_file(settings.cameras, placed_matrix(up, settings.scale))
+    resolution, max_depth = _settled_settings(tree.root)
+    warnings = []
+    if not any(node.tag == "emitter" for node in tree.root.everything()):
+        warnings.append("the scene has no light: everything in it is black")
+    if missing:
+        warnings.append(
+            f"{len(missing)} files are missing, what needs them is left out: {', '.join(missing)}"
+        )
+    return ImportedScene(
+        name=scene_title(file),
+        tree=tree,
+        up=up,
+        scale=settings.scale,
+        cameras=tuple(cameras),
+        resolution=resolution,
+        max_depth=max_depth,
+        changes=tuple(changes),
+        missing=tuple(missing),
+        warnings=tuple(warnings),
+        files=destinations(tree),
+    )
+
+
+def _settled_settings(root: Node) -> tuple[tuple[int, int], int]:
+    """Size of the first film and depth of the integrator; sensors and integrators go, as whoever renders has them."""
+    size, depth = DEFAULT_SIZE, DEFAULT_DEPTH
+    for node in root.nodes("sensor", "integrator"):
+        root.remove(node)
+        for film in node.nodes("film")[:1]:
+            if size is DEFAULT_SIZE:
+                size = (_whole(film, "width", size[0]), _whole(film, "height", size[1]))
+        if node.tag == "integrator":
+            depth = _whole(node, "max_depth", DEFAULT_DEPTH)
+    return size, depth
+
+
+def _whole(node: Node, name: str, default: int) -> int:
+    text = node.value(name, str(default))
+    try:
+        return int(text)
+    except ValueError:
+        raise SceneFileError(f"{node.where}: {name} '{text}' is no whole number") from None
+
+
+def scene_title(file: Path) -> str:
+    """What to call a scene: by its folder where the file is called scene.xml, else by the file."""
+    return file.resolve().parent.name if file.stem == "scene" else file.stem
+
+
+def fingerprint(file: Path, settings: ImportSettings) -> str:
+    """SHA-256 of a scene file and all the files that it names, hexadecimal: what it looks like depends on them alone.
+
+    Raises SceneFileError.
+    """
+    tree = read_tree(file, allow_outside=settings.allow_outside)
+    digest = hashlib.sha256(tostring(tree.root))
+    for _, name, path in named_files(tree):
+        digest.update(name.get("value", "").encode() + b"\0")
+        if isinstance(path, Path) and path.is_file():
+            with path.open("rb") as content:
+                digest.update(hashlib.file_digest(content, "sha256").digest())
+    return digest.hexdigest()

@@ -1,0 +1,414 @@
+"""Every rule by what it makes of a line of an old file, and what Mitsuba then makes of it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from gibench.generators.imported.errors import SceneFileError
+from gibench.generators.imported.upgrading import ALWAYS, LEGACY
+from gibench.rendering.backend import select_variant
+
+from .files import SQUARE, numbers, one, upgraded
+
+
+def rules_of(changes) -> set[str]:
+    return {change.rule for change in changes}
+
+
+def loads(root) -> object:
+    """Mitsuba's own verdict on what a rule made."""
+    from xml.etree.ElementTree import tostring
+
+    select_variant()
+    import mitsuba as mi
+
+    return mi.load_string(tostring(root, encoding="unicode"))
+
+
+def shape_of(bsdf: str) -> str:
+    return f'<shape type="rectangle">{bsdf}</shape>'
+
+
+def test_every_rule_has_a_test():
+    source = (__import__("pathlib").Path(__file__)).read_text()
+    for rule in (*LEGACY, *ALWAYS):
+        assert f'"{rule.__name__}"' in source, rule.__name__
+
+
+def test_a_new_file_is_left_as_it_is(tmp_path):
+    body = (
+        '<shape type="rectangle"><bsdf type="diffuse"><spectrum name="reflectance" value="0.5"/></bsdf>'
+        '<emitter type="area"><spectrum name="radiance" value="2"/></emitter></shape>'
+    )
+    root, changes = upgraded(tmp_path, body, version="3.0.0")
+    assert changes == []
+    assert [n.tag for n in root.everything()].count("spectrum") == 2
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("toWorld", "to_world"),
+        ("intIOR", "int_ior"),
+        ("extIOR", "ext_ior"),
+        ("diffuseReflectance", "diffuse_reflectance"),
+        ("alphaU", "alpha_u"),
+        ("faceNormals", "face_normals"),
+        ("sunRadiusScale", "sun_radius_scale"),
+        ("high_quality_edges", "high_quality_edges"),
+    ],
+)
+def test_names(tmp_path, old, new):
+    root, changes = upgraded(tmp_path, f'<shape type="rectangle"><float name="{old}" value="1"/></shape>')
+    assert root.nodes("shape")[0].nodes()[0].get("name") == new
+    assert rules_of(changes) == ({"property_names"} if old != new else set())
+
+
+def test_tags_of_transformations(tmp_path):
+    look = '<lookAt origin="0,0,0" target="1,0,0" up="0,0,1"/>'
+    body = f'<shape type="rectangle"><transform name="toWorld">{look}</transform></shape>'
+    root, changes = upgraded(tmp_path, body)
+    assert "transform_tags" in rules_of(changes)
+    assert one(root, "lookat").get("target") == "1,0,0"
+    loads(root)
+
+
+def test_axes_of_rotations_are_unit_vectors(tmp_path):
+    """Mitsuba 3 makes a shear of any other; a square that is only turned keeps its area."""
+    turned = '<transform name="toWorld"><rotate x="1" y="1" angle="40"/></transform>'
+    root, changes = upgraded(tmp_path, f'<shape type="rectangle">{turned}</shape>')
+    assert "rotation_axes" in rules_of(changes)
+    assert np.array(loads(root).shapes()[0].surface_area()).item() == pytest.approx(4, rel=1e-5)
+
+
+def test_settings_that_are_gone(tmp_path):
+    body = '<shape type="cube"><float name="maxSmoothAngle" value="30"/></shape>'
+    root, changes = upgraded(tmp_path, body)
+    assert [c.what for c in changes if c.rule == "gone_settings"] == ["max_smooth_angle is left out"]
+    loads(root)
+
+
+def test_an_animation_stands_still(tmp_path):
+    body = (
+        '<shape type="rectangle"><animation name="toWorld"><transform time="0"><translate x="1"/></transform>'
+        '<transform time="1"><translate x="9"/></transform></animation></shape>'
+    )
+    root, changes = upgraded(tmp_path, body)
+    assert [c.loss for c in changes if c.rule == "animations"] == [True]
+    assert one(root, "translate").get("x") == "1"
+    assert one(root, "transform").get("name") == "to_world"
+    loads(root)
+
+
+@pytest.mark.parametrize(
+    ("element", "expected", "rule"),
+    [
+        ('<srgb name="reflectance" value="0.5 0.25 1"/>', (0.2140411, 0.0508761, 1.0), "srgb_tags"),
+        ('<srgb name="reflectance" value="#ff8000"/>', (1.0, 0.2158605, 0.0), "hexadecimal_colors"),
+        (
+            '<rgb name="reflectance" value="#804020"/>',
+            (0.2158605, 0.0512695, 0.0144438),
+            "hexadecimal_colors",
+        ),
+        ('<spectrum name="reflectance" value="0.25"/>', (0.25,), "scalar_spectra"),
+    ],
+)
+def test_colors_become_linear(tmp_path, element, expected, rule):
+    root, changes = upgraded(tmp_path, shape_of(f'<bsdf type="diffuse">{element}</bsdf>'))
+    assert rule in rules_of(changes)
+    np.testing.assert_allclose(numbers(one(root, "rgb").get("value")), expected, atol=2e-7)
+    loads(root)
+
+
+def test_a_colour_that_is_none(tmp_path):
+    with pytest.raises(SceneFileError, match=r"scene\.xml:2: '#80' is no colour"):
+        upgraded(tmp_path, shape_of('<bsdf type="diffuse"><rgb name="reflectance" value="#80"/></bsdf>'))
+
+
+def test_a_scalar_light_is_grey_and_would_else_be_tinted(tmp_path):
+    """What Mitsuba makes of a light of a scalar spectrum: the tint that the rule takes away."""
+    lamp = (
+        '<shape type="rectangle"><emitter type="area"><spectrum name="radiance" value="2"/></emitter></shape>'
+    )
+
+    def radiance(version):
+        root, _ = upgraded(tmp_path, lamp, version=version)
+        import mitsuba as mi
+
+        emitter = loads(root).emitters()[0]
+        si = mi.SurfaceInteraction3f()
+        si.wi = mi.Vector3f(0, 0, 1)
+        return np.array(emitter.eval(si)).ravel()
+
+    np.testing.assert_allclose(radiance("0.6.0"), 2.0, rtol=1e-6)
+    np.testing.assert_allclose(radiance("3.0.0") / 2, (1.21, 0.95, 0.91), atol=0.006)
+
+
+def test_wavelengths_stay_a_spectrum(tmp_path):
+    body = shape_of('<bsdf type="diffuse"><spectrum name="reflectance" value="400:0.1, 700:0.9"/></bsdf>')
+    root, changes = upgraded(tmp_path, body)
+    assert rules_of(changes) == set()
+    assert one(root, "spectrum").get("value").startswith("400:")
+
+
+@pytest.mark.parametrize("outside", ["1.5", "water", "air"])
+def test_what_surrounds_a_conductor(tmp_path, outside):
+    """Fresnel's equations know the ratio alone, so both ways to write it reflect the same."""
+    ior = {"1.5": 1.5, "water": 1.333, "air": 1.0}[outside]
+    body = shape_of(
+        '<bsdf type="conductor"><rgb name="eta" value="0.2 0.9 1.1"/><rgb name="k" value="3.9 2.4 2.2"/>'
+        + f'<{"float" if outside[0].isdigit() else "string"} name="extEta" value="{outside}"/></bsdf>'
+    )
+    root, changes = upgraded(tmp_path, body)
+    assert "conductors" in rules_of(changes)
+    assert not any(c.loss for c in changes)
+    bsdf = one(root, "bsdf")
+    assert bsdf.property("ext_eta") is None
+    np.testing.assert_allclose(numbers(bsdf.value("eta")), np.array([0.2, 0.9, 1.1]) / ior, rtol=1e-6)
+    np.testing.assert_allclose(numbers(bsdf.value("k")), np.array([3.9, 2.4, 2.2]) / ior, rtol=1e-6)
+    loads(root)
+
+
+def furnace(root) -> np.ndarray:
+    """What a surface reflects of uniform light 1, seen at 20 degrees off its normal: by Mitsuba's own path tracer."""
+    import mitsuba as mi
+
+    scene = loads(root)
+    bsdf = scene.shapes()[0].bsdf()
+    angle = math.radians(20)
+    sampler = mi.load_dict({"type": "independent"})
+    sampler.seed(0, 1 << 18)
+    si = mi.SurfaceInteraction3f()
+    si.wi = mi.Vector3f(math.sin(angle), 0, math.cos(angle))
+    weight = bsdf.sample(mi.BSDFContext(), si, sampler.next_1d(), sampler.next_2d())[1]
+    return np.array(weight).mean(axis=-1)
+
+
+@pytest.mark.parametrize("plugin", ["phong", "ward"])
+def test_lobes_of_gone_plugins_keep_their_albedos(tmp_path, plugin):
+    body = shape_of(
+        f'<bsdf type="{plugin}"><rgb name="diffuseReflectance" value="0.3 0.2 0.1"/>'
+        # So sharp that next to nothing of a lobe is lost below the horizon.
+        '<rgb name="specularReflectance" value="0.1 0.2 0.3"/><float name="exponent" value="2000"/>'
+        '<float name="alphaU" value="0.03"/><float name="alphaV" value="0.03"/></bsdf>'
+    )
+    root, changes = upgraded(tmp_path, body)
+    change = next(c for c in changes if c.rule in ("phong", "ward"))
+    assert change.rule == plugin
+    assert change.loss
+    np.testing.assert_allclose(furnace(root), 0.4, atol=4e-3)
+
+
+def test_the_exponent_of_phong_is_a_roughness(tmp_path):
+    root, _ = upgraded(tmp_path, shape_of('<bsdf type="phong"><float name="exponent" value="198"/></bsdf>'))
+    assert float(one(root, "bsdf", "roughconductor").value("alpha_u")) == pytest.approx(0.1)
+
+
+def test_a_textured_phong(tmp_path):
+    texture = '<texture type="checkerboard" name="diffuseReflectance"/>'
+    root, _ = upgraded(tmp_path, shape_of(f'<bsdf type="phong">{texture}</bsdf>'))
+    assert one(root, "texture").get("name") == "reflectance"
+    loads(root)
+
+
+def test_rough_diffuse(tmp_path):
+    body = shape_of(
+        '<bsdf type="roughdiffuse"><rgb name="reflectance" value="0.4"/><float name="alpha" value="0.3"/></bsdf>'
+    )
+    root, changes = upgraded(tmp_path, body)
+    assert "rough_diffuse" in rules_of(changes)
+    np.testing.assert_allclose(furnace(root), 0.4, atol=1e-3)
+
+
+@pytest.mark.parametrize(("coat", "plastic"), [("coating", "plastic"), ("roughcoating", "roughplastic")])
+def test_a_coat_over_diffuse_is_plastic(tmp_path, coat, plastic):
+    inner = '<bsdf type="diffuse"><rgb name="reflectance" value="0.4 0.3 0.2"/></bsdf>'
+    alpha = '<float name="alpha" value="0.2"/>' if coat == "roughcoating" else ""
+    root, changes = upgraded(
+        tmp_path, shape_of(f'<bsdf type="{coat}"><float name="intIOR" value="1.7"/>{alpha}{inner}</bsdf>')
+    )
+    assert "coatings" in rules_of(changes)
+    bsdf = one(root, "bsdf", plastic)
+    assert bsdf.value("int_ior") == "1.7"
+    assert bsdf.value("diffuse_reflectance") == "0.4 0.3 0.2"
+    loads(root)
+
+
+def test_a_coat_over_metal_is_left_out(tmp_path):
+    root, changes = upgraded(
+        tmp_path,
+        shape_of(
+            '<bsdf type="coating"><bsdf type="conductor"><string name="material" value="Au"/></bsdf></bsdf>'
+        ),
+    )
+    assert [c.loss for c in changes if c.rule == "coatings"] == [True]
+    assert one(root, "bsdf").value("material") == "Au"
+    loads(root)
+
+
+def test_a_mixture_of_three_has_the_albedo_of_its_parts(tmp_path):
+    parts = "".join(
+        f'<bsdf type="diffuse"><rgb name="reflectance" value="{c}"/></bsdf>' for c in (0.1, 0.5, 0.9)
+    )
+    root, changes = upgraded(
+        tmp_path,
+        shape_of(f'<bsdf type="mixturebsdf"><string name="weights" value="0.5, 0.3, 0.2"/>{parts}</bsdf>'),
+    )
+    assert "mixtures" in rules_of(changes)
+    np.testing.assert_allclose(furnace(root), 0.5 * 0.1 + 0.3 * 0.5 + 0.2 * 0.9, atol=4e-3)
+
+
+def test_a_mixture_that_does_not_fit(tmp_path):
+    with pytest.raises(SceneFileError, match=r"mixturebsdf has 1 parts and the weights '0\.5, 0\.5'"):
+        upgraded(
+            tmp_path,
+            '<bsdf type="mixturebsdf"><string name="weights" value="0.5, 0.5"/><bsdf type="diffuse"/></bsdf>',
+        )
+
+
+def test_translucent_sheets(tmp_path):
+    root, changes = upgraded(
+        tmp_path, shape_of('<bsdf type="difftrans"><rgb name="transmittance" value="0.4"/></bsdf>')
+    )
+    assert "translucent" in rules_of(changes)
+    assert one(root, "bsdf", "principledthin").value("base_color") == "0.4"
+    loads(root)
+
+
+def test_distributions(tmp_path):
+    root, changes = upgraded(
+        tmp_path, shape_of('<bsdf type="roughplastic"><string name="distribution" value="phong"/></bsdf>')
+    )
+    assert "distributions" in rules_of(changes)
+    assert one(root, "bsdf").value("distribution") == "beckmann"
+    loads(root)
+
+
+def test_the_scale_of_a_bump_map(tmp_path):
+    body = shape_of(
+        '<bsdf type="bumpmap"><texture type="scale"><float name="scale" value="0.3"/><texture type="checkerboard"/>'
+        '</texture><bsdf type="diffuse"/></bsdf>'
+    )
+    root, changes = upgraded(tmp_path, body)
+    assert [c.loss for c in changes if c.rule == "bump_scale"] == [False]
+    assert one(root, "bsdf", "bumpmap").value("scale") == "0.3"
+    loads(root)
+
+
+def test_gamma_of_bitmaps(tmp_path):
+    def bitmap(gamma):
+        return (
+            '<bsdf type="diffuse"><texture type="bitmap" name="reflectance"><string name="filename" value="a.png"/>'
+            f'<float name="gamma" value="{gamma}"/></texture></bsdf>'
+        )
+
+    root, changes = upgraded(tmp_path, shape_of(bitmap(1)))
+    assert one(root, "texture").value("raw") == "true"
+    assert [c.loss for c in changes if c.rule == "bitmap_gamma"] == [False]
+    root, changes = upgraded(tmp_path, shape_of(bitmap(1.8)))
+    assert one(root, "texture").property("raw") is None
+    assert [c.loss for c in changes if c.rule == "bitmap_gamma"] == [True]
+
+
+def test_lookups_of_textures(tmp_path):
+    body = shape_of(
+        '<bsdf type="diffuse"><texture type="checkerboard" name="reflectance"><float name="uscale" value="4"/>'
+        '<float name="vscale" value="2"/><float name="uoffset" value="0.5"/></texture></bsdf>'
+    )
+    root, changes = upgraded(tmp_path, body)
+    assert "texture_lookups" in rules_of(changes)
+    from gibench.generators.imported.transforms import matrix_of
+
+    np.testing.assert_allclose(matrix_of(one(root, "transform"))[:2] @ [1, 1, 0, 1], (4.5, 2.0))
+    loads(root)
+    body = shape_of(
+        '<bsdf type="diffuse"><texture type="bitmap" name="reflectance"><string name="filename" value="a.png"/>'
+        '<string name="filterType" value="ewa"/><string name="wrapModeU" value="clamp"/>'
+        '<float name="maxAnisotropy" value="8"/></texture></bsdf>'
+    )
+    root, _ = upgraded(tmp_path, body)
+    texture = one(root, "texture")
+    assert (texture.value("filter_type"), texture.value("wrap_mode")) == ("bilinear", "clamp")
+    assert texture.property("max_anisotropy") is None
+
+
+def test_gone_textures(tmp_path):
+    for old, new in (("gridtexture", "checkerboard"), ("vertexcolors", "mesh_attribute")):
+        root, changes = upgraded(
+            tmp_path, shape_of(f'<bsdf type="diffuse"><texture type="{old}" name="reflectance"/></bsdf>')
+        )
+        assert "grid_textures" in rules_of(changes)
+        assert one(root, "texture").type == new
+
+
+def test_the_sun_rises_over_the_same_wall(tmp_path):
+    """A sky whose zenith was +y sends its light from +y, and from nowhere below."""
+    body = SQUARE + (
+        '<emitter type="sunsky"><vector name="sunDirection" x="0.3" y="0.8" z="0.1"/>'
+        '<float name="sunRadiusScale" value="2"/><float name="turbidity" value="4"/></emitter>'
+    )
+    root, changes = upgraded(tmp_path, body)
+    assert "sun_and_sky" in rules_of(changes)
+    assert float(one(root, "emitter").value("sun_aperture")) == pytest.approx(2 * 0.5358)
+    import mitsuba as mi
+
+    environment = loads(root).environment()
+
+    def radiance(x, y, z):
+        si = mi.SurfaceInteraction3f()
+        si.wi = -mi.Vector3f(np.array([x, y, z]) / np.linalg.norm([x, y, z]))
+        return np.array(environment.eval(si)).ravel().mean()
+
+    assert radiance(0.3, 0.8, 0.1) > 100 * radiance(-0.8, 0.5, 0.1) > 0
+    assert radiance(0.2, -0.5, 0.1) == 0
+    assert radiance(0.9, 0.1, 0.9) > 0
+
+
+@pytest.mark.parametrize(("old", "dark"), [("sun", "sky_scale"), ("sky", "sun_scale")])
+def test_sun_and_sky_alone(tmp_path, old, dark):
+    root, _ = upgraded(tmp_path, SQUARE + f'<emitter type="{old}"><float name="scale" value="3"/></emitter>')
+    emitter = one(root, "emitter")
+    assert emitter.type == "sunsky"
+    assert float(emitter.value(dark)) == 0
+    other = {"sky_scale": "sun_scale", "sun_scale": "sky_scale"}[dark]
+    assert float(emitter.value(other)) == 3
+    loads(root)
+
+
+def test_a_beam_is_a_narrow_spot(tmp_path):
+    root, changes = upgraded(tmp_path, SQUARE + '<emitter type="collimated"/>')
+    assert "gone_lights" in rules_of(changes)
+    assert one(root, "emitter").type == "spot"
+    loads(root)
+
+
+@pytest.mark.parametrize("version", ["0.6.0", "3.0.0"])
+def test_what_whoever_renders_decides(tmp_path, version):
+    body = SQUARE + (
+        '<integrator type="volpath"><integer name="max_depth" value="12"/></integrator>'
+        '<sensor type="perspective"><film type="ldrfilm"><integer name="width" value="64"/>'
+        '<boolean name="banner" value="false"/></film><sampler type="ldsampler"/></sensor>'
+        '<medium type="homogeneous" id="fog"/><shape type="cube"><ref name="interior" id="fog"/></shape>'
+    )
+    root, changes = upgraded(
+        tmp_path, body.replace("ldrfilm", "ldrfilm" if version[0] == "0" else "hdrfilm"), version=version
+    )
+    assert rules_of(changes) >= {"integrators", "media"}
+    assert ("films" in rules_of(changes)) == (version == "0.6.0")
+    assert one(root, "integrator").type == "path"
+    assert one(root, "integrator").value("max_depth") == "12"
+    assert [child.get("name") for child in one(root, "film").nodes()] == ["width"]
+    assert not [n for n in root.everything() if n.tag in ("medium", "ref", "sampler")]
+
+
+def test_edges_of_high_quality(tmp_path):
+    body = SQUARE + (
+        '<sensor type="perspective"><film type="hdrfilm"><boolean name="high_quality_edges" value="true"/></film>'
+        "</sensor>"
+    )
+    root, changes = upgraded(tmp_path, body)
+    assert [c.what for c in changes if c.rule == "films"] == ["high_quality_edges is left out"]
+    assert one(root, "film").nodes() == []
