@@ -28,7 +28,7 @@ from tests.generators import test_furniture as furniture_tests
 from tests.generators.materials import test_families as material_tests
 
 ROOT = Path(__file__).parent.parent
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [ROOT / "README.md", ROOT / "docs/results/README.md", *sorted((ROOT / "docs").glob("*.md"))]
 PROGRAMS = {"gibench": "main", "make-dataset": "make_dataset"}
 
 pytestmark = pytest.mark.skipif(not (ROOT / "docs").is_dir(), reason="tests run away from the documentation")
@@ -252,7 +252,7 @@ def test_the_thresholds_of_views_are_those_of_the_code():
     assert view_checks.LARGEST_SHARE == rooms.GLOSSY_SHARE == 0.5  # "half"
 
 
-@pytest.mark.parametrize("path", PAGES, ids=lambda path: path.name)
+@pytest.mark.parametrize("path", PAGES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_links_and_pictures_exist(path):
     targets = re.findall(r"\]\(([^)#\s]+)[^)]*\)", path.read_text("utf-8"))
     missing = [t for t in targets if "://" not in t and not (path.parent / t).exists()]
