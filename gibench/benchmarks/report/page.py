@@ -82,7 +82,8 @@ def page_data(source: ReportSource, summary: Summary) -> dict[str, Any]:
                 "higher": METRICS[name].direction == "higher",
                 "inTime": METRICS[name].inputs == "sequence",
             }
-            for name in METRICS
+            # As the track lists them: the board opens with its first.
+            for name in dict.fromkeys((*source.run.get("metrics", ()), *METRICS))
             if name in set(summary.scores["metric"])
         ],
         "stages": list(stage_times(source, summary).columns),

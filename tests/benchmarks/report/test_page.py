@@ -71,3 +71,12 @@ def test_gaps_in_the_frames_are_gaps_in_the_series(run):
     shown = next(result for result in data["results"] if result["id"] == first)["series"]["full/rmse"]
     assert shown[1] is None
     assert shown[0] is not None
+
+
+def test_metrics_stand_as_the_track_lists_them_and_others_after_them(run, tmp_path):
+    listing = SyntheticRun(tmp_path)
+    listing.run = {**listing.run, "metrics": ["psnr", "rmse"]}
+    data = page_data(listing, summarise(listing))
+    names = [metric["name"] for metric in data["metrics"]]
+    assert names[:2] == ["psnr", "rmse"]
+    assert sorted(names) == sorted({row["metric"] for _, row in summarise(run).scores.iterrows()})
