@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 from functools import cache
 from pathlib import Path
@@ -24,6 +25,15 @@ SCENES = {"staircase": 0.06, "living-room": 0.03, "kitchen": 0.03}
 pytestmark = pytest.mark.skipif(
     "GIBENCH_EXTERNAL" not in os.environ, reason="GIBENCH_EXTERNAL names no folder with scenes/"
 )
+
+
+@pytest.fixture(scope="module", autouse=True)
+def forgotten():
+    """No scene outlives this module: every material alive is traced into the kernels of all tests after it."""
+    yield
+    for kept in (imported, rooms, compared):
+        kept.cache_clear()
+    gc.collect()
 
 
 def folder(name: str) -> Path:
