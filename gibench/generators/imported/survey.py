@@ -54,7 +54,7 @@ class SceneCaster:
         self, origins: FloatArray, directions: FloatArray
     ) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
         """As `visibility.RayCaster.cast`."""
-        distance, shape, normal = hits(self._scene, origins, directions)
+        distance, shape, _, normal = hits(self._scene, origins, directions)
         side = np.abs(normal).argmax(axis=1)
         side = 2 * side + (np.take_along_axis(normal, side[:, None], axis=1)[:, 0] > 0)
         row = np.maximum(shape - 1, 0)
@@ -63,8 +63,8 @@ class SceneCaster:
         return distance, np.where(shape > 0, owner, -1)
 
 
-def hits(scene: Scene, origins: FloatArray, directions: FloatArray) -> tuple[Any, Any, Any]:
-    """Distance (inf on a miss), shape id (0 on a miss) and geometric normal of what rays (N, 3) meet."""
+def hits(scene: Scene, origins: FloatArray, directions: FloatArray) -> tuple[Any, Any, Any, Any]:
+    """Distance (inf on a miss), shape id (0 on a miss), face and geometric normal of what rays (N, 3) meet."""
     import drjit as dr
     import mitsuba as mi
 
@@ -74,8 +74,9 @@ def hits(scene: Scene, origins: FloatArray, directions: FloatArray) -> tuple[Any
     )
     si = scene.mi_scene.ray_intersect(ray, mi.RayFlags.Minimal, False)
     shape = scene.shape_ids(si.shape, si.is_valid())
-    dr.eval(si.t, si.n, shape)
-    return np.array(si.t), np.array(shape).astype(np.int64), np.array(si.n).T
+    dr.eval(si.t, si.n, si.prim_index, shape)
+    face = np.array(si.prim_index).astype(np.int64)
+    return np.array(si.t), np.array(shape).astype(np.int64), face, np.array(si.n).T
 
 
 def survey(scene: Scene, found: FloatArray) -> Stage:

@@ -6,11 +6,12 @@ Mitsuba merges meshes of one material when it loads a scene, and refuses to wher
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gibench.generators.imported.files import destinations
 from gibench.generators.imported.reading import Node, copied, new
@@ -22,29 +23,32 @@ from gibench.generators.scene_files import ply_bytes
 def without_flips(scene: ImportedScene) -> ImportedScene:
     """The scene without a mesh whose normals are flipped; it looks the same."""
     flipped = [node.get("id", "") for node in scene.tree.root.nodes("shape") if _is_flipped(node)]
-    return _baked(scene, flipped, turn=False) if flipped else scene
+    return _baked(scene, dict.fromkeys(flipped, np.zeros(1, dtype=bool))) if flipped else scene
 
 
-def with_meshes_turned(scene: ImportedScene, names: Sequence[str]) -> ImportedScene:
-    """The scene with these shapes turned round."""
-    return _baked(scene, names, turn=True)
+def with_meshes_turned(scene: ImportedScene, turned: Mapping[str, NDArray[np.bool_]]) -> ImportedScene:
+    """The scene with faces of shapes turned round.
+
+    turned: by shape id, (faces,) which of them; (1,) for all or none, as of shapes that are no meshes.
+    """
+    return _baked(scene, turned)
 
 
 def _is_flipped(node: Node) -> bool:
     return node.value("flip_normals") == "true"
 
 
-def _baked(scene: ImportedScene, names: Sequence[str], *, turn: bool) -> ImportedScene:
+def _baked(scene: ImportedScene, turned: Mapping[str, NDArray[np.bool_]]) -> ImportedScene:
     root, made = copied(scene.tree.root), dict(scene.tree.made)
     nodes = {node.get("id", ""): node for node in root.nodes("shape")}
     shapes = {shape.id(): shape for shape in scene.loaded.mi_scene.shapes()}
-    for name in names:
+    for name, faces in turned.items():
         node, shape = nodes[name], shapes[name]
-        flipped = _is_flipped(node) != turn
+        flipped = faces != _is_flipped(node)
         for gone in [part for part in node.nodes() if part.get("name") == "flip_normals"]:
             node.remove(gone)
         if not shape.is_mesh():  # which is never merged
-            if flipped:
+            if flipped.all():
                 node.append(new("boolean", node, name="flip_normals", value="true"))
             continue
         file = f"{re.sub(r'[^A-Za-z0-9_.-]', '_', name)}.turned.ply"
@@ -62,21 +66,32 @@ def _baked(scene: ImportedScene, names: Sequence[str], *, turn: bool) -> Importe
     return replace(scene, tree=tree, files=destinations(tree))
 
 
-def _mesh(shape: Any, flipped: bool) -> Mesh:
-    """A loaded mesh in world space with the faces of its file, or with these reversed."""
+def _mesh(shape: Any, flipped: NDArray[np.bool_]) -> Mesh:
+    """A loaded mesh in world space with the faces of its file, those reversed that are said to be, (F,) or (1,)."""
 
     def buffer(values: Any, width: int) -> Any:
         return np.array(values, dtype=np.float64).reshape(-1, width)
 
     vertices = buffer(shape.vertex_positions_buffer(), 3)
     faces = np.array(shape.faces_buffer(), dtype=np.int32).reshape(-1, 3)
-    faces = faces[:, ::-1] if flipped else faces
+    flipped = np.broadcast_to(flipped, len(faces))
     uvs = buffer(shape.vertex_texcoords_buffer(), 2) if shape.has_vertex_texcoords() else np.zeros((0, 2))
     if not shape.has_vertex_normals():
-        return Mesh(vertices, faces, np.zeros((0, 3)), uvs)
+        return Mesh(vertices, np.where(flipped[:, None], faces[:, ::-1], faces), np.zeros((0, 3)), uvs)
     normals = buffer(shape.vertex_normals_buffer(), 3)
     corners = vertices[faces]
     outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     # Whichever way the flag has turned them: they lie on the side of the faces.
     side = np.einsum("fc,fkc->", outward, normals[faces])
-    return Mesh(vertices, faces, normals if side >= 0 else -normals, uvs)
+    normals = normals if side >= 0 else -normals
+    # A vertex between faces that are reversed and others becomes two.
+    kept, reverse = np.unique(faces[~flipped]), np.unique(faces[flipped])
+    rows = np.concatenate([kept, reverse])
+    kept_row, reverse_row = np.zeros((2, len(vertices)), dtype=np.int32)
+    kept_row[kept], reverse_row[reverse] = np.arange(len(kept)), len(kept) + np.arange(len(reverse))
+    return Mesh(
+        vertices[rows],
+        np.where(flipped[:, None], reverse_row[faces[:, ::-1]], kept_row[faces]),
+        np.concatenate([normals[kept], -normals[reverse]]),
+        uvs[rows] if len(uvs) else uvs,
+    )

@@ -13,7 +13,7 @@ import trimesh
 from gibench.generators.daylight import hdr
 from gibench.generators.imported.errors import SceneFileError
 from gibench.generators.imported.openings import find_openings
-from gibench.generators.imported.orientation import oriented
+from gibench.generators.imported.orientation import oriented, pieces
 from gibench.generators.imported.relighting import lit_by_area_light, lit_by_environment
 from gibench.generators.imported.room import import_room, write_imported_room
 from gibench.generators.imported.scene import ImportSettings, fingerprint, import_scene
@@ -114,6 +114,70 @@ def _seen_from_inside(shape) -> float:
     return float(-np.array(si.n).ravel() @ [1, 0, 0])
 
 
+def _shell(scene):
+    return next(s for s in scene.loaded.mi_scene.shapes() if s.id() == "shell")
+
+
+def _faces_away(scene, eye=(0, 0, 1.2)) -> np.ndarray:
+    """Whether each triangle of the shell turns its back to a point."""
+    mesh = _shell(scene)
+    corners = np.array(mesh.vertex_positions_buffer()).reshape(-1, 3)[
+        np.array(mesh.faces_buffer()).reshape(-1, 3)
+    ]
+    outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return np.einsum("fc,fc->f", outward, np.array(eye) - corners.mean(axis=1)) < 0
+
+
+@pytest.mark.parametrize("normals", [False, True])
+@pytest.mark.parametrize("joined", [False, True])
+def test_one_wall_of_a_shape_is_turned_by_itself(tmp_path, joined, normals):
+    """Two triangles of a shell of twelve are wound the other way round, be they joined to the others or not."""
+    from gibench.generators.parts import Mesh
+    from gibench.generators.scene_files import write_ply
+
+    file = room_file(tmp_path)
+    cube = trimesh.creation.box(extents=(2, 2, 2))
+    vertices, faces = np.array(cube.vertices), np.array(cube.faces, dtype=np.int32)[:, ::-1].copy()
+    wall = np.flatnonzero(np.all(np.isclose(vertices[faces][..., 1], 1), axis=1))
+    assert len(wall) == 2
+    faces[wall] = faces[wall, ::-1]
+    if not joined:
+        vertices, faces = vertices[faces.ravel()], np.arange(36, dtype=np.int32).reshape(12, 3)
+    inward = -vertices / np.linalg.norm(vertices, axis=1, keepdims=True) if normals else np.zeros((0, 3))
+    write_ply(Mesh(vertices, faces, inward, np.zeros((0, 2))), tmp_path / "shell.ply")
+    text = file.read_text()
+    start = text.index('<shape type="cube" id="shell">')
+    stop = text.index("</shape>", start)
+    body = text[start:stop].replace(
+        '<shape type="cube" id="shell">',
+        '<shape type="ply" id="shell"><string name="filename" value="shell.ply"/>',
+    )
+    body = body.replace('<boolean name="flip_normals" value="true"/>', "")
+    file.write_text(text[:start] + body + text[stop:])
+    scene = import_scene(file)
+    assert np.count_nonzero(_faces_away(scene)) == 2
+    right, found = oriented(scene)
+    assert [c.rule for c in right.changes].count("orientation") == 1
+    assert not _faces_away(right).any()
+    assert len(found) > 100
+    camera = right.cameras[0].at(SIZE)
+    np.testing.assert_allclose(
+        color(right.loaded, camera).mean(), color(scene.loaded, camera).mean(), rtol=0.02
+    )
+
+
+def test_pieces_end_where_the_winding_turns():
+    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=np.float32)
+    one = np.array([[0, 1, 2], [0, 2, 3]])
+    np.testing.assert_array_equal(pieces(square, one), [0, 0])
+    np.testing.assert_array_equal(pieces(square, np.array([[0, 1, 2], [0, 3, 2]])), [0, 1])
+    # Vertices that are split, as for texture seams, do not part them; another place does.
+    split = np.concatenate([square[one.ravel()], square[one.ravel()] + 5])
+    np.testing.assert_array_equal(pieces(split, np.arange(12).reshape(4, 3)), [0, 0, 1, 1])
+    # A face without area, and three faces at one edge, are no trouble.
+    assert len(set(pieces(square, np.array([[0, 0, 0], [0, 1, 2], [0, 1, 2], [2, 1, 3]])))) >= 2
+
+
 @pytest.mark.parametrize("flat", ["false", "true"])
 def test_a_mesh_is_turned_in_its_file(tmp_path, flat):
     """Place, normals and texture coordinates stay, and so does what a flag had turned."""
@@ -151,8 +215,9 @@ def test_a_mesh_is_turned_in_its_file(tmp_path, flat):
     assert facing(scene)[0] < 0
     assert facing(after_scene)[0] < 0
     np.testing.assert_allclose(facing(scene)[1], facing(after_scene)[1], atol=1e-5)
-    assert facing(with_meshes_turned(scene, ["s"]))[0] > 0
-    assert facing(with_meshes_turned(with_meshes_turned(scene, ["s"]), ["s"]))[0] < 0
+    turned = {"s": np.ones(1, dtype=bool)}
+    assert facing(with_meshes_turned(scene, turned))[0] > 0
+    assert facing(with_meshes_turned(with_meshes_turned(scene, turned), turned))[0] < 0
 
 
 def test_without_views_only_its_own_cameras_are_there(tmp_path):
