@@ -22,6 +22,7 @@ from gibench.baselines.method import Setting, Site
 from gibench.baselines.probes import placement
 from gibench.baselines.probes.errors import ProbeError
 from gibench.baselines.probes.mappings import MAPPINGS
+from gibench.baselines.probes.narrowed import NarrowedMaterials
 from gibench.baselines.replay import Replay
 from gibench.datasets.exr import fits_half
 from gibench.rendering import surface
@@ -63,7 +64,8 @@ class ProbeSettings:
     """What decides the probes of a scene.
 
     count: about how many (≥ 1). width: texels around (even). height: from top to bottom. spp: paths a texel.
-    denoise: whether radiance goes through Open Image Denoise. mapping: a name in `MAPPINGS`.
+    denoise: whether radiance goes through Open Image Denoise. mapping: a name in `MAPPINGS`. first_roughness: what
+    GGX alpha is multiplied by where a path from the probe meets its first surface, in (0, 1].
     """
 
     count: int
@@ -72,6 +74,7 @@ class ProbeSettings:
     spp: int
     denoise: bool = False
     mapping: str = "lat-long"
+    first_roughness: float = 1.0
 
     def __post_init__(self) -> None:
         """Raises ProbeError."""
@@ -81,6 +84,8 @@ class ProbeSettings:
             raise ProbeError(f"maps of {self.width} × {self.height} texels: both must be even and at least 2")
         if self.count < 1 or not 1 <= self.spp <= LANES:
             raise ProbeError(f"{self.count} probes of {self.spp} paths a texel: at least 1 of each is needed")
+        if not 0 < self.first_roughness <= 1:
+            raise ProbeError(f"first_roughness is {self.first_roughness}: it must be above 0, at most 1")
 
     @staticmethod
     def of(settings: Mapping[str, Setting]) -> ProbeSettings:
@@ -109,9 +114,15 @@ def _rays(positions, mapping, lane, inside: Any):
 class _Baker:
     """Fills maps of all probes, pass by pass."""
 
-    def __init__(self, scene: Scene, positions: NDArray[np.float32], settings: ProbeSettings) -> None:
-        """positions: (N, 3), metres."""
-        self.scene, self.settings, self.count = scene, settings, len(positions)
+    def __init__(
+        self,
+        scene: Scene,
+        positions: NDArray[np.float32],
+        settings: ProbeSettings,
+        materials: NarrowedMaterials | None = None,
+    ) -> None:
+        """positions: (N, 3), metres. materials: of the first hits, where they are not the scene's own."""
+        self.scene, self.settings, self.count, self.materials = scene, settings, len(positions), materials
         self.mapping = MAPPINGS[settings.mapping](settings.width, settings.height)
         self.positions = mi.Float(positions.ravel())
         dr.make_opaque(self.positions)
@@ -120,7 +131,8 @@ class _Baker:
         self, kernel: Callable[..., dict[str, Any]], samples: int, files: Mapping[str, NDArray[Any]]
     ) -> None:
         """Fill arrays (probes, height, width, components) by name from a kernel(first, seed, texels), pass by pass."""
-        replay = Replay(self.scene, kernel, self.positions)
+        held = [] if self.materials is None else self.materials.arrays
+        replay = Replay(self.scene, kernel, self.positions, held)
         flat = {name: array.reshape(-1, array.shape[-1]) for name, array in files.items()}
         total = len(next(iter(flat.values())))
         most = max(LANES // samples, 1)
@@ -144,16 +156,17 @@ class _Baker:
         lane = dr.arange(mi.UInt32, texels * spp) // dr.opaque(mi.UInt32, spp) + first
         ray = _rays(self.positions, self.mapping, lane, sampler.next_2d())
         si = self.scene.mi_scene.ray_intersect(ray)
+        narrowed = self.materials
         path = scatter_paths(
             self.scene.mi_scene,
             sampler,
             si,
-            si.bsdf(ray),
+            si.bsdf(ray) if narrowed is None else narrowed.at(si),
             mi.Bool(True),
             max_depth=MAX_DEPTH,
             lobes="specular",
             portals=self.scene.portals,
-            layers=self.scene.layers,
+            layers=(self.scene if narrowed is None else narrowed).layers,
         )
         value = path.direct_specular + path.indirect_specular
         value = dr.select(dr.all(dr.isfinite(value)), value * share, 0)
@@ -243,6 +256,12 @@ def _bake_radiance(baker: _Baker, folder: Path) -> None:
     (folder / "raw.npy").unlink()
 
 
+def _first_materials(site: Site, settings: ProbeSettings) -> NarrowedMaterials | None:
+    if settings.first_roughness == 1:
+        return None
+    return NarrowedMaterials(site.scene, site.folder / "scene.xml", settings.first_roughness)
+
+
 def baked_files(site: Site, settings: ProbeSettings, maps: tuple[str, ...]) -> dict[str, Path]:
     """Files by name of map, and "positions", baked where they are not there yet.
 
@@ -270,13 +289,17 @@ def baked_files(site: Site, settings: ProbeSettings, maps: tuple[str, ...]) -> d
         }
         if part == RADIANCE:
             chosen |= {"spp": settings.spp, "denoise": settings.denoise, "max_depth": MAX_DEPTH}
+            if settings.first_roughness != 1:
+                chosen["first_roughness"] = settings.first_roughness
 
         def make(folder: Path, part: str = part) -> None:
-            baker = _Baker(site.scene, np.load(where), settings)
+            positions = np.load(where)
             if part == RADIANCE:
-                _bake_radiance(baker, folder)
+                _bake_radiance(
+                    _Baker(site.scene, positions, settings, _first_materials(site, settings)), folder
+                )
             else:
-                _bake_surfaces(baker, part, folder)
+                _bake_surfaces(_Baker(site.scene, positions, settings), part, folder)
 
         folder = site.bakes.get("probes", chosen, make).folder
         files |= {name: folder / f"{name}.npy" for name in maps if MAPS[name][0] == part}
