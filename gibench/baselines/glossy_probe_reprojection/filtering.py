@@ -48,11 +48,22 @@ class Guides:
 
 
 @dr.syntax
-def _line(color: Any, weight: Any, guides: Guides, direction: Any, deviation: Any, taps: Any, active: Any):
+def _line(
+    color: Any,
+    weight: Any,
+    guides: Guides,
+    direction: Any,
+    deviation: Any,
+    taps: Any,
+    again: Any,
+    active: Any,
+):
     """Mean of the pixels along a line through each, mi.Color3f.
 
     color, weight: evaluated, of all pixels. direction: unit mi.Vector2f. deviation: mi.Float, pixels. taps: mi.UInt32, to
-    either side at most; of wider lines every second pixel is read, or every third, and so on.
+    either side about, at most; of wider lines every second pixel is read, or every third, and so on. again: mi.Bool of
+    one lane, whether this is the second pass along the line: it takes longer strides, since two of the same length would
+    leave copies of whatever is small.
     """
     lane = dr.arange(mi.UInt32, dr.width(color))
     row = mi.Int32(lane) // guides.width
@@ -64,6 +75,7 @@ def _line(color: Any, weight: Any, guides: Guides, direction: Any, deviation: An
     length = dr.rcp(dr.abs(longer))
     reach = REACH * deviation / length
     stride = dr.maximum(dr.ceil(reach / mi.Float(taps)), 1)
+    stride = dr.select(again & (stride > 1), stride + 1, stride)
     count = dr.select(active & (deviation > SMALL), mi.Int32(reach / stride), 0)
     falloff = -0.5 * dr.square(length / dr.maximum(deviation, 1e-6))
 
@@ -104,6 +116,7 @@ def filtered(color: Any, weight: Any, guides: Guides, covariance: Covariance, ta
     lines = [(direction, dr.sqrt(first * share)), (turned, dr.sqrt(second * share))]
     dr.eval(color, weight, guides, lines)
     for number in range(PASSES):
-        color = _line(color, weight, guides, *lines[number % 2], taps, active)
+        again = dr.opaque(mi.Bool, number >= PASSES // 2)
+        color = _line(color, weight, guides, *lines[number % 2], taps, again, active)
         dr.eval(color)
     return color

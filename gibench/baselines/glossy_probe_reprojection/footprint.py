@@ -63,7 +63,9 @@ def lobe(alpha: Any, share: Any, radius: Any) -> Any:
 
 def deviation(alpha: Any, share: Any) -> NDArray[np.float64]:
     """Standard deviation of the fitted Gaussian along any line through the centre: tangents. Arrays broadcast."""
-    alpha, share = np.broadcast_arrays(np.asarray(alpha, float)[..., None], np.asarray(share, float)[..., None])
+    alpha, share = np.broadcast_arrays(
+        np.asarray(alpha, float)[..., None], np.asarray(share, float)[..., None]
+    )
     # Rings that lie as dense as the lobe asks for: equal steps of the logarithm, from well inside of it.
     first = np.minimum(1e-3 * alpha * share, 1e-3)
     steps = np.linspace(0, 1, RINGS)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from types import SimpleNamespace
 from typing import Any, ClassVar
@@ -109,15 +110,13 @@ def _recalled(frame, surfaces, color, energy):
     return result
 
 
-def _filtered(footprint, camera, surfaces, mirrored, color, energy, size, unit, blur, taps):
-    """Glossy light after the filter."""
-    guides = Guides(
-        surfaces["normal"], surfaces["distance"], surfaces["material"], *size, unit
-    )
+def _filtered(footprint, camera, surfaces, mirrored, color, energy, size, unit, blur, reduced, taps):
+    """Glossy light after the filter. reduced: roughness in the probes over the surfaces' own."""
+    guides = Guides(surfaces["normal"], surfaces["distance"], surfaces["material"], *size, unit)
     reach, distance = mirrored["reach"], surfaces["distance"]
     share = dr.select(mirrored["far"], 1, reach / dr.maximum(reach + distance, 1e-20))
     roughness = surfaces["roughness"]
-    own, baked = (footprint.deviation(factor * roughness, share) for factor in (1.0, REDUCED))
+    own, baked = (footprint.deviation(factor * roughness, share) for factor in (1.0, reduced))
     towards = (surfaces["position"] - camera["_origin"]) / dr.maximum(distance, 1e-20)
     cosine = dr.abs(dr.dot(towards, surfaces["normal"]))
     across, down, ahead = (dr.dot(axis, surfaces["normal"]) for axis in camera["_axes"])
@@ -149,7 +148,9 @@ class GlossyProbeReprojection(OnLightmap):
     def prepare(self, site: Site) -> None:
         """Bake the lightmap and the probes, or find them."""
         super().prepare(site)
-        probes = load_probes(site, ProbeSettings.of(self.settings), MAPS)
+        self._reduced = REDUCED if self.settings["halved"] else 1.0
+        asked = replace(ProbeSettings.of(self.settings), first_roughness=self._reduced)
+        probes = load_probes(site, asked, MAPS)
         self._positions = np.array(probes.arrays[POSITIONS]).reshape(-1, 3)
         table, footprint = Table(probes), Footprint()
         self.kernels["gather"] = Replay(site.scene, partial(_gathered, table), table.arrays)
@@ -198,6 +199,7 @@ class GlossyProbeReprojection(OnLightmap):
                     size,
                     unit,
                     dr.opaque(mi.Float, float(knobs["blur"])),
+                    dr.opaque(mi.Float, self._reduced),
                     dr.opaque(mi.UInt32, int(knobs["taps"])),
                 )
             specular = averaged(color, fine, grid)
