@@ -1,4 +1,4 @@
-"""Glossy Probe Reprojection (Rodriguez et al. 2020): probes searched around where a reflection should be, then filtered."""
+"""Glossy Probe Reprojection (Rodriguez et al. 2020): probes searched where a reflection should be, then filtered."""
 
 from gibench.baselines.lightmap.knobs import LIGHTMAP_KNOBS, RAYS
 from gibench.baselines.method import Knob, Method

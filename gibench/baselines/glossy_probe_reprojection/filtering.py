@@ -1,7 +1,7 @@
 """The second step of the convolution: a Gaussian of its own shape at every pixel, kept within a surface.
 
-Rodriguez et al. 2020, sections 6.2 and 6.3: equation 4, split into four passes along lines, the first and the third along
-the first principal direction of the covariance, the others along the second, each with half of the variance.
+Rodriguez et al. 2020, sections 6.2 and 6.3: equation 4, split into four passes along lines, the first and the third
+along the first principal direction of the covariance, the others along the second, each with half of the variance.
 """
 
 # mypy: disable-error-code="no-untyped-def, misc"
@@ -60,10 +60,10 @@ def _line(
 ):
     """Mean of the pixels along a line through each, mi.Color3f.
 
-    color, weight: evaluated, of all pixels. direction: unit mi.Vector2f. deviation: mi.Float, pixels. taps: mi.UInt32, to
-    either side about, at most; of wider lines every second pixel is read, or every third, and so on. again: mi.Bool of
-    one lane, whether this is the second pass along the line: it takes longer strides, since two of the same length would
-    leave copies of whatever is small.
+    color, weight: evaluated, of all pixels. direction: unit mi.Vector2f. deviation: mi.Float, pixels. taps: mi.UInt32,
+    to either side about, at most; of wider lines every second pixel is read, or every third, and so on. again: mi.Bool
+    of one lane, whether this is the second pass along the line: it takes longer strides, since two of the same length
+    would leave copies of whatever is small.
     """
     lane = dr.arange(mi.UInt32, dr.width(color))
     row = mi.Int32(lane) // guides.width

@@ -1,7 +1,7 @@
 """Finding in the probes what a pixel reflects: a search around the place that path perturbation points at.
 
-Rodriguez et al. 2020, section 5.2: two grids of samples, the second finer and around the best of the first; the energy of
-equation 1 says which sample fits the pixel best, and equation 2 blends those of several probes.
+Rodriguez et al. 2020, section 5.2: two grids of samples, the second finer and around the best of the first; the energy
+of equation 1 says which sample fits the pixel best, and equation 2 blends those of several probes.
 """
 
 # mypy: disable-error-code="no-untyped-def, misc"

@@ -2,9 +2,9 @@
 
 Chen and Arvo 2000 ("Theory and application of specular path perturbation") and Rodriguez et al. 2020, section 5.1: the
 path from p over x to q is stationary among those over the surface f = 0 (Fermat), so x is a function of p, and the
-implicit function theorem gives its derivatives. Here f is the paraboloid z = ½ (κ₁ s² + κ₂ t²) over the tangent plane at
-x, whose third derivatives vanish, and the system of four equations is solved by hand: two unknowns in the tangent plane,
-then the height over it and the Lagrange multiplier.
+implicit function theorem gives its derivatives. Here f is the paraboloid z = ½ (κ₁ s² + κ₂ t²) over the tangent plane
+at x, whose third derivatives vanish, and the system of four equations is solved by hand: two unknowns in the tangent
+plane, then the height over it and the Lagrange multiplier.
 """
 
 # mypy: disable-error-code="no-untyped-def, misc"

@@ -115,7 +115,7 @@ class Probes:
         return self.mapping.direction(at)
 
     def stretch(self, probe: Any, at: Any) -> Any:
-        """Texels of a plain map that one of the maps of probes stands for at texel coordinates, mi.Float, as a length."""
+        """Texels of a plain map that one at texel coordinates stands for, mi.Float, as a length."""
         return mi.Float(1)
 
     def texel_at(self, probe: Any, at: Any) -> Any:
