@@ -30,6 +30,13 @@ REACH = 2.5
 SMALL = 0.25
 """Pixels of standard deviation below which a pass leaves a pixel as it is."""
 
+ASIDE = 0.75
+"""Pixels that samples are moved aside of their line at most, by turns. Lines at 45° would otherwise never leave the one
+half of the pixels that they begin in."""
+
+TURNS = (0.7548776662, 0.5698402910, 0.6180339887)
+"""Of those, with the column, the row and the sample: irrational numbers, so that neighbours differ (Roberts 2018)."""
+
 
 @dataclass
 class Guides:
@@ -54,16 +61,17 @@ def _line(
     guides: Guides,
     direction: Any,
     deviation: Any,
+    aside: Any,
     taps: Any,
     again: Any,
     active: Any,
 ):
     """Mean of the pixels along a line through each, mi.Color3f.
 
-    color, weight: evaluated, of all pixels. direction: unit mi.Vector2f. deviation: mi.Float, pixels. taps: mi.UInt32,
-    to either side about, at most; of wider lines every second pixel is read, or every third, and so on. again: mi.Bool
-    of one lane, whether this is the second pass along the line: it takes longer strides, since two of the same length
-    would leave copies of whatever is small.
+    color, weight: evaluated, of all pixels. direction: unit mi.Vector2f. deviation: mi.Float, pixels. aside: mi.Float,
+    how far samples may be moved off the line, pixels. taps: mi.UInt32, to either side about, at most; of wider lines
+    every second pixel is read, or every third, and so on. again: mi.Bool of one lane, whether this is the second pass
+    along the line: it takes longer strides, since two of the same length would leave copies of whatever is small.
     """
     lane = dr.arange(mi.UInt32, dr.width(color))
     row = mi.Int32(lane) // guides.width
@@ -89,8 +97,10 @@ def _line(
     k = -count
     while k <= count:
         offset = mi.Float(k) * stride
-        x = column + mi.Int32(dr.round(offset * step.x))
-        y = row + mi.Int32(dr.round(offset * step.y))
+        turn = TURNS[0] * mi.Float(column) + TURNS[1] * mi.Float(row) + TURNS[2] * mi.Float(k)
+        off = aside * (2 * (turn - dr.floor(turn)) - 1)
+        x = column + mi.Int32(dr.round(offset * step.x + dr.select(steep, off, 0)))
+        y = row + mi.Int32(dr.round(offset * step.y + dr.select(steep, 0, off)))
         inside = (k != 0) & (x >= 0) & (x < guides.width) & (y >= 0) & (y < guides.height)
         at = mi.UInt32(dr.select(inside, y * guides.width + x, 0))
         inside &= dr.gather(mi.UInt32, guides.material, at, inside) == material
@@ -113,7 +123,11 @@ def filtered(color: Any, weight: Any, guides: Guides, covariance: Covariance, ta
     first, second, direction = covariance.principal()
     turned = mi.Vector2f(-direction.y, direction.x)
     share = 2 / PASSES
-    lines = [(direction, dr.sqrt(first * share)), (turned, dr.sqrt(second * share))]
+    long, short = dr.sqrt(first * share), dr.sqrt(second * share)
+    lines = [
+        (direction, long, ASIDE * dr.minimum(short, 1)),
+        (turned, short, ASIDE * dr.minimum(long, 1)),
+    ]
     dr.eval(color, weight, guides, lines)
     for number in range(PASSES):
         again = dr.opaque(mi.Bool, number >= PASSES // 2)

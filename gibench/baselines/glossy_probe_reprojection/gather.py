@@ -33,7 +33,7 @@ FALLOFF = 8.0
 NOTHING = 1e3
 """Energy where a probe has no sample of the surface at all; the largest of any sample is 30."""
 
-STAND_IN = 1e-3
+STAND_IN = 0.02
 """Weight of probes outside of the cell around the camera, over that of its corners: they count where one of those was
 dropped, or none of them shows the surface."""
 

@@ -132,7 +132,7 @@ def test_a_footprint_of_nothing_is_the_identity():
 
 def test_what_is_not_trusted_is_filled_in_from_around():
     """Holes have a weight of 0; where everything is one, it stays."""
-    image = np.where((np.hypot(X - 36, Y - 28) < 3)[..., None], 100.0, 0.5)
+    image = np.where((np.hypot(X - 36, Y - 28) < 3)[..., None], 100.0, np.full(3, 0.5))
     weight = np.where(np.hypot(X - 36, Y - 28) < 3, 0.0, 1.0)
     np.testing.assert_allclose(run(image, turned(30, 30, 0), weight=weight), 0.5, rtol=1e-5)
     np.testing.assert_allclose(run(noise(), turned(30, 30, 0), weight=0.0), noise(), rtol=1e-5)

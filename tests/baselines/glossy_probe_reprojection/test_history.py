@@ -49,11 +49,11 @@ def recall(lift=0.0, material=1, known=True):
 
 
 def test_points_have_the_color_that_they_had():
-    """To within half a pixel, of 7 cm at most along the floor."""
+    """To within half a pixel: 13 cm of the floor at most, over which colors change by as much."""
     color, there, expected, inside = recall()
     np.testing.assert_array_equal(there, inside)
     assert 0.5 < there.mean() < 1
-    np.testing.assert_allclose(color[there], expected[there], atol=0.1)
+    np.testing.assert_allclose(color[there], expected[there], atol=0.15)
     assert not color[~there].any()
 
 
