@@ -20,8 +20,11 @@ from numpy.typing import NDArray
 
 from gibench.baselines.method import Setting, Site
 from gibench.baselines.probes import placement
+from gibench.baselines.probes.adaptive import parameterization
+from gibench.baselines.probes.adaptive.parameterization import CELLS, GUIDE_MAPS, GUIDES, parameterize
+from gibench.baselines.probes.adaptive.warp import Warp
 from gibench.baselines.probes.errors import ProbeError
-from gibench.baselines.probes.mappings import MAPPINGS
+from gibench.baselines.probes.mappings import ADAPTIVE, MAPPINGS
 from gibench.baselines.probes.narrowed import NarrowedMaterials
 from gibench.baselines.replay import Replay
 from gibench.datasets.exr import fits_half
@@ -43,6 +46,8 @@ SEED = 0
 """Probes are part of the scene to all methods and seeds."""
 
 POSITIONS, RADIANCE, VISIBLE, REFLECTED = "positions", "radiance", "visible", "reflected"
+FORWARD, INVERSE = "forward", "inverse"
+"""Files of the bake `parameterization`."""
 
 MAPS: dict[str, tuple[str, int, type]] = {
     "radiance": (RADIANCE, 3, np.float16),
@@ -100,15 +105,17 @@ class ProbeSettings:
         )
 
 
-def _rays(positions, mapping, lane, inside: Any):
+def _rays(positions, mapping, warp: Warp | None, lane, inside: Any):
     """Rays of lanes that count texels, all of a probe after all of another. inside: mi.Point2f, place in the texel."""
     texels = dr.opaque(mi.UInt32, mapping.width * mapping.height)
     width = dr.opaque(mi.UInt32, mapping.width)
     probe = lane // texels
     texel = lane - probe * texels
     row = texel // width
-    corner = mi.Point2f(mi.Float(texel - row * width), mi.Float(row))
-    return mi.Ray3f(dr.gather(mi.Point3f, positions, probe), mapping.direction(corner + inside))
+    at = mi.Point2f(mi.Float(texel - row * width), mi.Float(row)) + inside
+    if warp is not None:
+        at = warp.plain(probe, at)
+    return mi.Ray3f(dr.gather(mi.Point3f, positions, probe), mapping.direction(at))
 
 
 class _Baker:
@@ -119,10 +126,17 @@ class _Baker:
         scene: Scene,
         positions: NDArray[np.float32],
         settings: ProbeSettings,
+        *,
         materials: NarrowedMaterials | None = None,
+        warp: Warp | None = None,
     ) -> None:
-        """positions: (N, 3), metres. materials: of the first hits, where they are not the scene's own."""
-        self.scene, self.settings, self.count, self.materials = scene, settings, len(positions), materials
+        """positions: (N, 3), metres.
+
+        materials: of the first hits, where they are not the scene's own. warp: of adaptive probes.
+        """
+        self.scene, self.settings, self.count = scene, settings, len(positions)
+        self.materials, self.warp = materials, warp
+        self.held = [thing.arrays for thing in (materials, warp) if thing is not None]
         self.mapping = MAPPINGS[settings.mapping](settings.width, settings.height)
         self.positions = mi.Float(positions.ravel())
         dr.make_opaque(self.positions)
@@ -131,8 +145,7 @@ class _Baker:
         self, kernel: Callable[..., dict[str, Any]], samples: int, files: Mapping[str, NDArray[Any]]
     ) -> None:
         """Fill arrays (probes, height, width, components) by name from a kernel(first, seed, texels), pass by pass."""
-        held = [] if self.materials is None else self.materials.arrays
-        replay = Replay(self.scene, kernel, self.positions, held)
+        replay = Replay(self.scene, kernel, self.positions, self.held)
         flat = {name: array.reshape(-1, array.shape[-1]) for name, array in files.items()}
         total = len(next(iter(flat.values())))
         most = max(LANES // samples, 1)
@@ -154,7 +167,7 @@ class _Baker:
         sampler.independent.seed(seed, texels * spp)
         share = dr.rcp(dr.opaque(mi.Float, spp))
         lane = dr.arange(mi.UInt32, texels * spp) // dr.opaque(mi.UInt32, spp) + first
-        ray = _rays(self.positions, self.mapping, lane, sampler.next_2d())
+        ray = _rays(self.positions, self.mapping, self.warp, lane, sampler.next_2d())
         si = self.scene.mi_scene.ray_intersect(ray)
         narrowed = self.materials
         path = scatter_paths(
@@ -180,7 +193,7 @@ class _Baker:
 
         def kernel(first, seed, texels: int) -> dict[str, Any]:
             lane = dr.arange(mi.UInt32, texels) + first
-            ray = _rays(self.positions, self.mapping, lane, mi.Point2f(0.5))
+            ray = _rays(self.positions, self.mapping, self.warp, lane, mi.Point2f(0.5))
             hit = Hit(self.scene, ray, mi.RayFlags.All)
             mirror = hit.mirrored() if any(name.startswith("reflected") for name in names) else hit
             values: dict[str, Callable[[], Any]] = {
@@ -256,6 +269,35 @@ def _bake_radiance(baker: _Baker, folder: Path) -> None:
     (folder / "raw.npy").unlink()
 
 
+def _bake_parameterization(
+    scene: Scene, positions: NDArray[np.float32], size: tuple[int, int], folder: Path
+) -> None:
+    """size: (width, height) of the maps of the probes."""
+    width, height = GUIDES
+    baker = _Baker(scene, positions, ProbeSettings(len(positions), width, height, 1))
+    shape = (len(positions), height, width)
+    guides = {name: np.zeros((*shape, MAPS[name][1]), dtype=np.float32) for name in GUIDE_MAPS}
+    baker.run(baker.surfaces(GUIDE_MAPS), 1, guides)
+    row, column = np.indices((height, width), dtype=np.float32).reshape(2, -1) + 0.5
+    towards = np.array(baker.mapping.direction(mi.Point2f(column, row))).T.reshape(height, width, 3)
+    forward = _new(folder, FORWARD, (len(positions), CELLS[1] + 1, CELLS[0] + 1, 2), np.float32)
+    inverse = _new(folder, INVERSE, (len(positions), size[1] + 1, size[0] + 1, 2), np.float32)
+    for k in range(len(positions)):
+        one = {name: guide[k] for name, guide in guides.items()}
+        facing = np.abs((one["normal"] * towards).sum(axis=-1))
+        forward[k], inverse[k] = parameterize(one, facing, size)
+    for file in (forward, inverse):
+        file.flush()  # type: ignore[attr-defined]
+
+
+def load_warp(settings: ProbeSettings, files: Mapping[str, Path]) -> Warp | None:
+    """Where the texels of probes look, from `baked_files`; None where they are not adaptive."""
+    if settings.mapping != ADAPTIVE:
+        return None
+    forward, inverse = (np.load(files[name]) for name in (FORWARD, INVERSE))
+    return Warp((settings.width, settings.height), forward, inverse)
+
+
 def _first_materials(site: Site, settings: ProbeSettings) -> NarrowedMaterials | None:
     if settings.first_roughness == 1:
         return None
@@ -279,27 +321,36 @@ def baked_files(site: Site, settings: ProbeSettings, maps: tuple[str, ...]) -> d
 
     where = site.bakes.get("probes", placed, make_positions).folder / "positions.npy"
     files = {POSITIONS: where}
+    mapped = {
+        **placed,
+        "mapping": settings.mapping,
+        "width": settings.width,
+        "height": settings.height,
+    }
+    if settings.mapping == ADAPTIVE:
+        mapped["parameterization"] = parameterization.VERSION
+
+        def make_parameterization(folder: Path) -> None:
+            _bake_parameterization(site.scene, np.load(where), (settings.width, settings.height), folder)
+
+        chosen = {**mapped, "part": "parameterization"}
+        folder = site.bakes.get("probes", chosen, make_parameterization).folder
+        files |= {name: folder / f"{name}.npy" for name in (FORWARD, INVERSE)}
     for part in dict.fromkeys(MAPS[name][0] for name in maps):
-        chosen: dict[str, Any] = {
-            **placed,
-            "part": part,
-            "mapping": settings.mapping,
-            "width": settings.width,
-            "height": settings.height,
-        }
+        chosen = {**mapped, "part": part}
         if part == RADIANCE:
             chosen |= {"spp": settings.spp, "denoise": settings.denoise, "max_depth": MAX_DEPTH}
             if settings.first_roughness != 1:
                 chosen["first_roughness"] = settings.first_roughness
 
-        def make(folder: Path, part: str = part) -> None:
-            positions = np.load(where)
+        def make(folder: Path, part: str = part, files: dict[str, Path] = files) -> None:
+            narrowed = _first_materials(site, settings) if part == RADIANCE else None
+            warp = load_warp(settings, files)
+            baker = _Baker(site.scene, np.load(where), settings, materials=narrowed, warp=warp)
             if part == RADIANCE:
-                _bake_radiance(
-                    _Baker(site.scene, positions, settings, _first_materials(site, settings)), folder
-                )
+                _bake_radiance(baker, folder)
             else:
-                _bake_surfaces(_Baker(site.scene, positions, settings), part, folder)
+                _bake_surfaces(baker, part, folder)
 
         folder = site.bakes.get("probes", chosen, make).folder
         files |= {name: folder / f"{name}.npy" for name in maps if MAPS[name][0] == part}

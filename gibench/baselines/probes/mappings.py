@@ -59,6 +59,12 @@ class LatLong:
         sine_azimuth, cosine_azimuth = dr.sincos(azimuth)
         return mi.Vector3f(sine * cosine_azimuth, sine * sine_azimuth, cosine)
 
+    def clamped(self, coordinates: Any) -> Any:
+        """Coordinates of the map: x around the sphere, y no further than a pole."""
+        width, height = dr.opaque(mi.Float, self.width), dr.opaque(mi.Float, self.height)
+        x = coordinates.x - width * dr.floor(coordinates.x / width)
+        return mi.Point2f(dr.minimum(x, width), dr.clip(coordinates.y, 0, height))
+
     def wrapped(self, column: Any, row: Any) -> tuple[Any, Any]:
         """The texel that column and row (mi.Int32, at most one outside) stand for: over a pole, half way around."""
         width, height = dr.opaque(mi.Int32, self.width), dr.opaque(mi.Int32, self.height)
@@ -106,6 +112,10 @@ class Octahedral:
     def _size(self) -> Any:
         return mi.Vector2f(dr.opaque(mi.Float, self.width), dr.opaque(mi.Float, self.height))
 
+    def clamped(self, coordinates: Any) -> Any:
+        """Coordinates of the map: no further than its edges."""
+        return dr.clip(coordinates, 0, self._size)
+
     def wrapped(self, column: Any, row: Any) -> tuple[Any, Any]:
         """The texel that column and row (mi.Int32, at most one outside) stand for: an edge is folded at its middle."""
         width, height = dr.opaque(mi.Int32, self.width), dr.opaque(mi.Int32, self.height)
@@ -116,4 +126,11 @@ class Octahedral:
         return dr.clip(folded_column, 0, width - 1), dr.clip(folded_row, 0, height - 1)
 
 
-MAPPINGS = {mapping.name: mapping for mapping in (LatLong, Octahedral)}
+ADAPTIVE = "adaptive"
+"""Equirectangular, with the texels of each probe moved to where they are needed (`adaptive`)."""
+
+MAPPINGS: dict[str, type[LatLong] | type[Octahedral]] = {
+    LatLong.name: LatLong,
+    Octahedral.name: Octahedral,
+    ADAPTIVE: LatLong,
+}

@@ -12,7 +12,7 @@ import mitsuba as mi
 import numpy as np
 
 from gibench.baselines.method import Site
-from gibench.baselines.probes.baking import MAPS, POSITIONS, ProbeSettings, baked_files
+from gibench.baselines.probes.baking import MAPS, POSITIONS, ProbeSettings, baked_files, load_warp
 from gibench.baselines.probes.errors import ProbeError
 from gibench.baselines.probes.mappings import MAPPINGS
 
@@ -38,20 +38,25 @@ def _on_device(path: Path) -> Any:
 class Probes:
     """Probes and some of their maps.
 
-    count: number of probes. mapping: where directions lie on a map. arrays: what a `Replay` must hold.
+    count: number of probes. mapping: where directions lie on a map, before its texels are moved. arrays: what a
+    `Replay` must hold.
 
-    Probes are counted from 0. Texels are counted by row over all maps of a probe, so that `texel` and `corners` give
-    what `fetch` takes.
+    Texel coordinates are mi.Point2f, (0, 0) the outer corner of the first texel, x along the columns. Probes are
+    counted from 0. Texels are counted by row over all maps of a probe, so that `texel` and `corners` give what `fetch`
+    takes.
     """
 
     def __init__(self, settings: ProbeSettings, files: dict[str, Path]) -> None:
         """files: from `baking.baked_files`."""
         self.mapping = MAPPINGS[settings.mapping](settings.width, settings.height)
-        self.arrays = {name: _on_device(path) for name, path in files.items()}
+        self.arrays = {name: _on_device(path) for name, path in files.items() if name in (POSITIONS, *MAPS)}
         self.count = len(np.load(files[POSITIONS], mmap_mode="r"))
         self._texels = mi.UInt32(settings.width * settings.height)
         self._number = mi.UInt32(self.count)
         self.arrays |= {"texels": self._texels, "number": self._number}
+        self._warp = load_warp(settings, files)
+        if self._warp is not None:
+            self.arrays["warp"] = self._warp.arrays
         dr.make_opaque(self.arrays)
 
     def position(self, probe: Any) -> Any:
@@ -84,22 +89,47 @@ class Probes:
             probe += 1
         return found
 
+    def coordinates(self, probe: Any, direction: Any) -> Any:
+        """Texel coordinates of a direction (mi.Vector3f, of any length) from a probe, in [0, width] × [0, height]."""
+        at = self.mapping.coordinates(direction)
+        return at if self._warp is None else self._warp.moved(probe, at)
+
+    def direction(self, probe: Any, at: Any) -> Any:
+        """Unit mi.Vector3f that texel coordinates of a probe stand for; those of texel centres were baked."""
+        at = self.mapping.clamped(at)
+        return self.mapping.direction(at if self._warp is None else self._warp.plain(probe, at))
+
+    def stretch(self, probe: Any, at: Any) -> Any:
+        """How wide a texel is at texel coordinates, mi.Float, where 1 is what it is without moved texels.
+
+        |∂f⁻¹/∂x| in section 5.2 of Rodriguez et al. 2020, as the square root of the Jacobian's determinant.
+        """
+        return mi.Float(1) if self._warp is None else self._warp.stretch(probe, self.mapping.clamped(at))
+
     def texel(self, probe: Any, direction: Any) -> Any:
         """The texel (mi.UInt32) that a direction (mi.Vector3f, of any length) from a probe falls into."""
-        at = self.mapping.coordinates(direction)
+        return self.texel_at(probe, self.coordinates(probe, direction))
+
+    def texel_at(self, probe: Any, at: Any) -> Any:
+        """The texel (mi.UInt32) that texel coordinates fall into; beside the map, the one that they wrap to."""
+        at = self.mapping.clamped(at)
         column = dr.minimum(mi.Int32(at.x), self.mapping.width - 1)
         row = dr.minimum(mi.Int32(at.y), self.mapping.height - 1)
         return self._index(probe, column, row)
 
     def corners(self, probe: Any, direction: Any) -> list[tuple[Any, Any]]:
         """The four texels around a direction from a probe, each with its bilinear weight, which sum to 1."""
-        at = self.mapping.coordinates(direction) - 0.5
+        return self.corners_at(probe, self.coordinates(probe, direction))
+
+    def corners_at(self, probe: Any, at: Any) -> list[tuple[Any, Any]]:
+        """The four texels around texel coordinates, each with its bilinear weight, which sum to 1."""
+        at = self.mapping.clamped(at) - 0.5
         low = dr.floor(at)
         share = at - low
         column, row = mi.Int32(low.x), mi.Int32(low.y)
         return [
             (
-                self._index(probe, *self.mapping.wrapped(column + i, row + j)),
+                self._index(probe, *self._wrapped(column + i, row + j)),
                 (share.x if i else 1 - share.x) * (share.y if j else 1 - share.y),
             )
             for j in (0, 1)
@@ -154,6 +184,12 @@ class Probes:
         return sum(
             weight * self.fetch(name, texel, active) for texel, weight in self.corners(probe, direction)
         )
+
+    def _wrapped(self, column: Any, row: Any) -> tuple[Any, Any]:
+        # Where texels are moved, what lies over a pole is not half way around: the row next to it is repeated.
+        if self._warp is not None:
+            row = dr.clip(row, 0, dr.opaque(mi.Int32, self.mapping.height - 1))
+        return self.mapping.wrapped(column, row)
 
     def _index(self, probe: Any, column: Any, row: Any) -> Any:
         return probe * self._texels + mi.UInt32(row * dr.opaque(mi.Int32, self.mapping.width) + column)
