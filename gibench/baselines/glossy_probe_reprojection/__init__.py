@@ -18,6 +18,13 @@ METHOD = Method(
         Knob("order", 2, (0, 1, 2), "of the path perturbation that a search starts at"),
         Knob("paraboloid", True, (False, True), "whether surfaces are curved to the perturbation, or flat"),
         Knob(
+            "parameterization",
+            "adaptive",
+            ("plain", "adaptive"),
+            "of the maps: even, or more texels for what is smooth, far or intricate",
+            bakes=True,
+        ),
+        Knob(
             "halved",
             True,
             (False, True),

@@ -40,6 +40,9 @@ from gibench.rendering.integrator import NOT_DIFFUSE
 LEAST_ENERGY = 0.01
 """Energy below which samples are all as good: equation 4 divides by it."""
 
+MAPPINGS = {"plain": "lat-long", "adaptive": "adaptive"}
+"""Of the probes, by parameterization."""
+
 RECALLED = 1.0
 """Energy of what comes from the frame before."""
 
@@ -149,7 +152,11 @@ class GlossyProbeReprojection(OnLightmap):
         """Bake the lightmap and the probes, or find them."""
         super().prepare(site)
         self._reduced = REDUCED if self.settings["halved"] else 1.0
-        asked = replace(ProbeSettings.of(self.settings), first_roughness=self._reduced)
+        asked = replace(
+            ProbeSettings.of(self.settings),
+            mapping=MAPPINGS[str(self.settings["parameterization"])],
+            first_roughness=self._reduced,
+        )
         probes = load_probes(site, asked, MAPS)
         self._positions = np.array(probes.arrays[POSITIONS]).reshape(-1, 3)
         table, footprint = Table(probes), Footprint()

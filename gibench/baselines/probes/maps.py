@@ -136,42 +136,6 @@ class Probes:
             for i in (0, 1)
         ]
 
-    def coordinates(self, probe: Any, direction: Any) -> Any:
-        """mi.Point2f texel coordinates on the maps of probes (mi.UInt32) of a direction (mi.Vector3f, any length)."""
-        return self.mapping.coordinates(direction)
-
-    def direction(self, probe: Any, at: Any) -> Any:
-        """Unit mi.Vector3f of texel coordinates (mi.Point2f) on the maps of probes."""
-        return self.mapping.direction(at)
-
-    def stretch(self, probe: Any, at: Any) -> Any:
-        """Texels of a plain map that one at texel coordinates stands for, mi.Float, as a length."""
-        return mi.Float(1)
-
-    def texel_at(self, probe: Any, at: Any) -> Any:
-        """The texel (mi.UInt32) at coordinates, which may lie beyond the left and right edge."""
-        return self._index(probe, *self._around(mi.Int32(dr.floor(at.x)), mi.Int32(dr.floor(at.y))))
-
-    def corners_at(self, probe: Any, at: Any) -> list[tuple[Any, Any]]:
-        """The four texels around coordinates, each with its bilinear weight, which sum to 1."""
-        low = dr.floor(at - 0.5)
-        share = at - 0.5 - low
-        column, row = mi.Int32(low.x), mi.Int32(low.y)
-        return [
-            (
-                self._index(probe, *self._around(column + i, row + j)),
-                (share.x if i else 1 - share.x) * (share.y if j else 1 - share.y),
-            )
-            for j in (0, 1)
-            for i in (0, 1)
-        ]
-
-    def _around(self, column: Any, row: Any) -> tuple[Any, Any]:
-        width, height = dr.opaque(mi.Int32, self.mapping.width), dr.opaque(mi.Int32, self.mapping.height)
-        column = dr.select(column < 0, column + width, column)
-        column = dr.select(column >= width, column - width, column)
-        return dr.clip(column, 0, width - 1), dr.clip(row, 0, height - 1)
-
     def fetch(self, name: str, texel: Any, active: Any = True) -> Any:
         """What a map holds at texels: mi.Float, mi.UInt32 (ids) or mi.Vector3f (three components); 0 where inactive."""
         array, size = self.arrays[name], MAPS[name][1]
