@@ -51,10 +51,9 @@ def _gbuffer(scene, lightmap, camera, width: int, height: int):
     """What was hit, the light it sends out but for glossy light, and what search and filter know of it."""
     hits = hits_of_rays(scene, ray_generator(camera), (width, height))
     seen = hits.emission + lightmap.diffuse(hits.si, hits.preliminary, hits.active)
-    bent = hits.preliminary.compute_surface_interaction(hits.ray, mi.RayFlags.All | mi.RayFlags.dNSdUV)
-    first, second, direction = _principal_curvatures(
-        SimpleNamespace(si=bent, valid=hits.active, rays=hits.ray)
-    )
+    si = hits.preliminary.compute_surface_interaction(hits.ray, mi.RayFlags.All | mi.RayFlags.dNSdUV)
+    bent: Any = SimpleNamespace(si=si, valid=hits.active, rays=hits.ray)
+    first, second, direction = _principal_curvatures(bent)
     surfaces = {
         "glossy": hits.active & ((hits.bsdf.flags() & NOT_DIFFUSE) != 0),
         "position": dr.select(hits.active, mi.Point3f(hits.si.p), 0),

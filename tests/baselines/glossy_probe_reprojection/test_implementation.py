@@ -21,8 +21,13 @@ from tests.baselines.probes.test_narrowed import metal, saved
 from tests.baselines.sites import RESOLUTION, lit_box, site, view
 from tests.rendering import scenes
 
+PLAIN = {"halved": False, "parameterization": "plain"}
+"""What needs neither a scene's file nor a solver."""
 
-@pytest.fixture(autouse=True)
+CHEAP = PLAIN | {"texels": 4, "lightmap_spp": 16, "probe_width": 128, "probe_spp": 4}
+
+
+@pytest.fixture(autouse=True, scope="module")
 def let_go():
     """A scene that is alive is traced into the kernels of the next."""
     yield
@@ -42,9 +47,16 @@ def rendered(method, where, **given):
     return prepared(method, where, **given).render(view(CAMERA), stages), stages
 
 
-def adjusted(implementation, **given):
+def adjusted(implementation, given):
     implementation.adjust(GPR.settings(SMALL | given))
     return implementation.render(view(CAMERA), Stages())
+
+
+@pytest.fixture(scope="module")
+def mirror(tmp_path_factory):
+    """The method on the floor, cheaply baked, for what asks for no accuracy."""
+    where = site(load_dict(mirror_floor(0.1)), tmp_path_factory.mktemp("mirror"))
+    return prepared(GPR, where, **CHEAP)
 
 
 @pytest.mark.parametrize("roughness", [0.005, 0.5])
@@ -69,7 +81,7 @@ def test_nearer_to_the_truth_than_the_nearest_probe(tmp_path, roughness):
 
 def test_without_gloss_the_image_is_the_diffuse_one(tmp_path):
     where = site(saved(scenes.closed_box(0.5, 1.0), tmp_path), tmp_path)
-    found, _ = rendered(GPR, where)
+    found, _ = rendered(GPR, where, texels=4, lightmap_spp=16, probe_width=64, probe_spp=1)
     assert not found.specular.any()
     assert (found.color > 0).all()
     assert found.extra == {"found": 1.0, "energy": 0.0}
@@ -81,7 +93,7 @@ def test_a_camera_at_a_probe_sees_what_the_probe_does(tmp_path, monkeypatch):
         placement, "place", lambda scene, count: np.array([CAMERA.position] * count, dtype=np.float32)
     )
     where = site(load_dict(mirror_floor(0.05)), tmp_path)
-    knobs = {"probes": 8, "probe_width": 256, "used": 1, "halved": False, "filter": False}
+    knobs = CHEAP | {"probe_width": 256, "probes": 8, "used": 1, "filter": False}
     ours, _ = rendered(GPR, where, **knobs)
     plain, _ = rendered(NEAREST, where, **knobs)
     inner = plain.specular[:, :, 0] > 0
@@ -91,25 +103,23 @@ def test_a_camera_at_a_probe_sees_what_the_probe_does(tmp_path, monkeypatch):
     assert ours.extra["energy"] < 0.04
 
 
-@pytest.mark.parametrize("size", [0.01, 100.0])
-def test_a_scene_of_another_size_gives_the_same_image(tmp_path, size):
+def test_a_scene_of_another_size_gives_the_same_image(tmp_path):
     def image(half, unit, folder):
         camera = PinholeCamera(
             (0.5 * half, 0.6 * half, 0.3 * half), (-0.4 * half, -0.5 * half, -0.8 * half), 1.2
         )
         scene = load_dict(lit_box(metal(0.1), half=half))
-        implementation = prepared(GPR, site(scene, folder), halved=False, unit=unit)
+        implementation = prepared(GPR, site(scene, folder), **CHEAP, unit=unit)
         return implementation.render(view(camera), Stages()).specular
 
-    once, other = image(1.0, 1.0, tmp_path / "one"), image(size, size, tmp_path / "other")
+    once, other = image(1.0, 1.0, tmp_path / "one"), image(100.0, 100.0, tmp_path / "other")
     assert once.max() > 1
     # The probes are sampled anew, where rounding may place one beside where it was.
     assert np.sqrt(np.mean((once - other) ** 2)) < 0.05 * once.mean()
 
 
-def test_knobs_that_do_not_bake_change_the_image_and_change_it_back(tmp_path):
-    implementation = prepared(GPR, site(load_dict(mirror_floor(0.1)), tmp_path), halved=False)
-    plain = adjusted(implementation, halved=False).specular
+def test_knobs_that_do_not_bake_change_the_image_and_change_it_back(mirror):
+    plain = adjusted(mirror, CHEAP).specular
     for given in (
         {"used": 1},
         {"window": 1},
@@ -117,12 +127,10 @@ def test_knobs_that_do_not_bake_change_the_image_and_change_it_back(tmp_path):
         {"order": 0},
         {"unit": 0.01},
     ):
-        assert np.abs(adjusted(implementation, halved=False, **given).specular - plain).max() > 1e-3, given
-        np.testing.assert_array_equal(adjusted(implementation, halved=False).specular, plain)
+        assert np.abs(adjusted(mirror, CHEAP | given).specular - plain).max() > 1e-3, given
+        np.testing.assert_array_equal(adjusted(mirror, CHEAP).specular, plain)
     # Probes of the whole roughness leave nothing to the filter.
-    np.testing.assert_allclose(
-        adjusted(implementation, halved=False, filter=False).specular, plain, atol=1e-3
-    )
+    np.testing.assert_allclose(adjusted(mirror, CHEAP | {"filter": False}).specular, plain, atol=1e-3)
 
 
 def test_two_steps_make_the_roughness_of_one(tmp_path):
@@ -132,31 +140,30 @@ def test_two_steps_make_the_roughness_of_one(tmp_path):
     size = (64, 48)
     truth = render_frame(scene, CAMERA, resolution=size, spp=1024, channels=["radiance"]).arrays
     expected = np.minimum(truth["direct_specular"] + truth["indirect_specular"], 1)
-    implementation = prepared(GPR, where, probe_spp=64)
+    knobs = {"probe_spp": 64, "parameterization": "plain"}
+    implementation = prepared(GPR, where, **knobs)
 
     def error(**given):
-        implementation.adjust(GPR.settings(SMALL | {"probe_spp": 64} | given))
+        implementation.adjust(GPR.settings(SMALL | knobs | given))
         found = implementation.render(View(CAMERA, None, size, 0, 0), Stages()).specular
         return np.sqrt(np.mean((np.minimum(found, 1) - expected) ** 2))
 
     assert error() < 0.8 * error(filter=False)
 
 
-def test_the_frame_before_stands_in_where_no_probe_has_a_sample(tmp_path):
+def test_the_frame_before_stands_in_where_no_probe_has_a_sample(mirror, monkeypatch):
     """Probes that do not show the floor: all comes from the frame that was, which the first does not have."""
-    implementation = prepared(GPR, site(load_dict(mirror_floor(0.1)), tmp_path), halved=False)
-    before = implementation.render(view(CAMERA), Stages())
-    table = implementation.kernels["gather"]
-    hidden = lambda *arguments: _nothing(table(*arguments))  # noqa: E731
-    implementation.kernels["gather"] = hidden
+    before = adjusted(mirror, CHEAP)
+    gather = mirror.kernels["gather"]
+    monkeypatch.setitem(mirror.kernels, "gather", lambda *arguments: _nothing(gather(*arguments)))
     following = View(CAMERA, CAMERA, RESOLUTION, 1, 0)
-    again = implementation.render(following, Stages())
-    np.testing.assert_allclose(again.specular, before.specular, atol=0.05)
-    alone = implementation.render(view(CAMERA), Stages())
+    again = mirror.render(following, Stages())
+    np.testing.assert_allclose(again.specular, before.specular, atol=1e-4)
+    alone = mirror.render(view(CAMERA), Stages())
     assert not alone.specular.any()
     assert alone.extra["found"] == 0
     # What was not known then is not known now.
-    assert not implementation.render(following, Stages()).specular.any()
+    assert not mirror.render(following, Stages()).specular.any()
 
 
 def _nothing(found):
@@ -169,6 +176,6 @@ def test_very_bright_and_small_highlights_stay_finite(tmp_path):
     scene["spark"] = scenes.rectangle(
         [0, 0.3, 0.9], [0, 0, -1], (2e-3, 2e-3), emitter=scenes.area(1e7, 1e7, 1e7)
     )
-    found, _ = rendered(GPR, site(saved(scene, tmp_path), tmp_path))
+    found, _ = rendered(GPR, site(load_dict(scene), tmp_path), **CHEAP)
     assert np.isfinite(found.color).all()
     assert (found.specular >= 0).all()
