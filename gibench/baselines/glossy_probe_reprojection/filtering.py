@@ -30,13 +30,6 @@ REACH = 2.5
 SMALL = 0.25
 """Pixels of standard deviation below which a pass leaves a pixel as it is."""
 
-ASIDE = 0.75
-"""Pixels that samples are moved aside of their line at most, by turns. Lines at 45° would otherwise never leave the one
-half of the pixels that they begin in."""
-
-TURNS = (0.7548776662, 0.5698402910, 0.6180339887)
-"""Of those, with the column, the row and the sample: irrational numbers, so that neighbours differ (Roberts 2018)."""
-
 
 @dataclass
 class Guides:
@@ -61,31 +54,26 @@ def _line(
     guides: Guides,
     direction: Any,
     deviation: Any,
-    aside: Any,
     taps: Any,
     again: Any,
     active: Any,
 ):
     """Mean of the pixels along a line through each, mi.Color3f.
 
-    color, weight: evaluated, of all pixels. direction: unit mi.Vector2f. deviation: mi.Float, pixels. aside: mi.Float,
-    how far samples may be moved off the line, pixels. taps: mi.UInt32, to either side about, at most; of wider lines
-    every second pixel is read, or every third, and so on. again: mi.Bool of one lane, whether this is the second pass
-    along the line: it takes longer strides, since two of the same length would leave copies of whatever is small.
+    color, weight: evaluated, of all pixels. direction: unit mi.Vector2f. deviation: mi.Float, pixels. taps: mi.UInt32,
+    to either side about, at most; of wider lines every second pixel is read, or every third, and so on. again: mi.Bool
+    of one lane, whether this is the second pass along the line: it takes longer strides, since two of the same length
+    would leave copies of whatever is small. Samples between pixels are bilinear: lines at 45° would otherwise never
+    leave the one half of the pixels that they begin in.
     """
     lane = dr.arange(mi.UInt32, dr.width(color))
     row = mi.Int32(lane) // guides.width
     column = mi.Int32(lane) - row * guides.width
-    steep = dr.abs(direction.y) > dr.abs(direction.x)
-    longer = dr.select(steep, direction.y, direction.x)
-    # Steps of a whole pixel along the axis that the line is nearer to: no pixel counts twice.
-    step = direction / longer
-    length = dr.rcp(dr.abs(longer))
-    reach = REACH * deviation / length
+    reach = REACH * deviation
     stride = dr.maximum(dr.ceil(reach / mi.Float(taps)), 1)
     stride = dr.select(again & (stride > 1), stride + 1, stride)
-    count = dr.select(active & (deviation > SMALL), mi.Int32(reach / stride), 0)
-    falloff = -0.5 * dr.square(length / dr.maximum(deviation, 1e-6))
+    count = dr.select(active & (deviation > SMALL), mi.Int32(dr.ceil(reach / stride)), 0)
+    falloff = -0.5 * dr.rcp(dr.square(dr.maximum(deviation, 1e-6)))
 
     normal = dr.gather(mi.Vector3f, guides.normal, lane)
     depth = dr.gather(mi.Float, guides.depth, lane)
@@ -97,19 +85,23 @@ def _line(
     k = -count
     while k <= count:
         offset = mi.Float(k) * stride
-        turn = TURNS[0] * mi.Float(column) + TURNS[1] * mi.Float(row) + TURNS[2] * mi.Float(k)
-        off = aside * (2 * (turn - dr.floor(turn)) - 1)
-        x = column + mi.Int32(dr.round(offset * step.x + dr.select(steep, off, 0)))
-        y = row + mi.Int32(dr.round(offset * step.y + dr.select(steep, 0, off)))
-        inside = (k != 0) & (x >= 0) & (x < guides.width) & (y >= 0) & (y < guides.height)
-        at = mi.UInt32(dr.select(inside, y * guides.width + x, 0))
-        inside &= dr.gather(mi.UInt32, guides.material, at, inside) == material
-        inside &= dr.abs(dr.gather(mi.Float, guides.depth, at, inside) - depth) < DEPTH * guides.unit
-        inside &= dr.dot(dr.gather(mi.Vector3f, guides.normal, at, inside), normal) > ALIKE
-        share = dr.gather(mi.Float, weight, at, inside) * dr.exp(falloff * dr.square(offset))
-        share = dr.select(inside, share, 0)
-        result += share * dr.gather(mi.Color3f, color, at, inside)
-        total += share
+        place = offset * direction
+        low = dr.floor(place)
+        part = place - low
+        near = dr.select(k != 0, dr.exp(falloff * dr.square(offset)), 0)
+        for i in range(2):
+            for j in range(2):
+                x, y = column + mi.Int32(low.x) + i, row + mi.Int32(low.y) + j
+                share = near * (part.x if i else 1 - part.x) * (part.y if j else 1 - part.y)
+                inside = (share > 0) & (x >= 0) & (x < guides.width) & (y >= 0) & (y < guides.height)
+                at = mi.UInt32(dr.select(inside, y * guides.width + x, 0))
+                inside &= dr.gather(mi.UInt32, guides.material, at, inside) == material
+                apart = dr.abs(dr.gather(mi.Float, guides.depth, at, inside) - depth)
+                inside &= apart < DEPTH * guides.unit
+                inside &= dr.dot(dr.gather(mi.Vector3f, guides.normal, at, inside), normal) > ALIKE
+                share = dr.select(inside, share * dr.gather(mi.Float, weight, at, inside), 0)
+                result += share * dr.gather(mi.Color3f, color, at, inside)
+                total += share
         k += 1
     return dr.select(total > 0, result / dr.select(total > 0, total, 1), before)
 
@@ -123,11 +115,7 @@ def filtered(color: Any, weight: Any, guides: Guides, covariance: Covariance, ta
     first, second, direction = covariance.principal()
     turned = mi.Vector2f(-direction.y, direction.x)
     share = 2 / PASSES
-    long, short = dr.sqrt(first * share), dr.sqrt(second * share)
-    lines = [
-        (direction, long, ASIDE * dr.minimum(short, 1)),
-        (turned, short, ASIDE * dr.minimum(long, 1)),
-    ]
+    lines = [(direction, dr.sqrt(first * share)), (turned, dr.sqrt(second * share))]
     dr.eval(color, weight, guides, lines)
     for number in range(PASSES):
         again = dr.opaque(mi.Bool, number >= PASSES // 2)

@@ -76,11 +76,17 @@ def turned(first, second, degrees):
     ids=["round", "wide", "high", "slanted", "diagonal"],
 )
 def test_four_passes_are_the_filter_over_the_plane(covariance):
-    """Of noise, whose deviation is .29: what is left of the difference is that lines step by whole pixels."""
+    """Of noise, to a tenth of what the filter leaves of it: lines at an angle sample bilinearly, and end at 2.5 σ.
+
+    At the borders too, where both lose what lies beyond, but not along the same lines.
+    """
     image = noise()
-    difference = run(image, covariance) - whole_plane(image, covariance)
-    assert np.abs(difference).max() < 0.035
-    assert np.sqrt(np.mean(difference**2)) < 0.008
+    expected = whole_plane(image, covariance)
+    difference = run(image, covariance) - expected
+    inner = difference[12:-12, 12:-12]
+    assert np.abs(inner).max() < 0.4 * expected.std()
+    assert np.sqrt(np.mean(inner**2)) < 0.1 * expected.std()
+    assert np.sqrt(np.mean(difference**2)) < 0.15 * expected.std()
 
 
 def test_the_covariance_is_that_which_was_asked_for():
@@ -92,7 +98,7 @@ def test_the_covariance_is_that_which_was_asked_for():
     found /= found.sum()
     offset = np.stack([X - 36, Y - 28], axis=-1)
     moments = np.einsum("yx,yxi,yxj->ij", found, offset, offset)
-    np.testing.assert_allclose(moments, covariance, atol=0.12 * 20)
+    np.testing.assert_allclose(moments, covariance, rtol=0.1)
 
 
 def test_nothing_crosses_an_edge_of_normal_depth_or_material():
