@@ -18,14 +18,12 @@ from gibench.rendering import surface
 from gibench.rendering.backend import is_scalar
 from gibench.rendering.camera import PinholeCamera, RayGenerator
 from gibench.rendering.channels import CHANNELS, SETS
+from gibench.rendering.curvature import FLAGS
 from gibench.rendering.integrator import bsdf_at, shading_normal
 from gibench.rendering.scene import Scene
 
 VISIBILITY_TOLERANCE = 1e-3
 """Relative difference of distance below which a point counts as the one that the earlier camera saw."""
-
-UMBILIC_TOLERANCE = 1e-4
-"""Relative difference of the principal curvatures below which they count as equal."""
 
 SURFACE_SETS = ("surface", "reflection", "curvature", "motion")
 
@@ -47,7 +45,8 @@ class _Hit:
     def __init__(self, scene: Scene, rays: Any, flags: Any) -> None:
         self.scene = scene
         self.rays = rays
-        self.si = scene.mi_scene.ray_intersect(rays, flags, True)
+        self.preliminary = scene.mi_scene.ray_intersect_preliminary(rays, coherent=True)
+        self.si = self.preliminary.compute_surface_interaction(rays, flags)
         self.valid = self.si.is_valid()
         self.bsdf = bsdf_at(self.si, rays)
 
@@ -68,46 +67,6 @@ class _Hit:
 
     def masked(self, value: Any) -> Any:
         return dr.select(self.valid, value, 0)
-
-
-def _principal_curvatures(hit: _Hit) -> tuple[Any, Any, Any]:
-    """The two principal curvatures (1/m), larger size first, and the unit direction of the first.
-
-    From the derivatives of position and shading normal along u and v (Weingarten's equations): on a mesh these are
-    those of the interpolated normals, exact on Mitsuba's analytic shapes. Where u and v do not span the surface, 0.
-    """
-    si = hit.si
-    s = dr.normalize(si.dp_du)
-    s = dr.select(dr.isfinite(s.x) & (dr.squared_norm(si.dp_du) > 0), s, mi.coordinate_system(si.n)[0])
-    t = dr.cross(si.n, s)
-    a, b = dr.dot(si.dp_du, s), dr.dot(si.dp_dv, s)
-    c, d = dr.dot(si.dp_du, t), dr.dot(si.dp_dv, t)
-    determinant = a * d - b * c
-    scale = dr.squared_norm(si.dp_du) * dr.squared_norm(si.dp_dv)
-    usable = hit.valid & (dr.square(determinant) > 1e-10 * scale)
-    inverse = dr.select(usable, dr.rcp(determinant), 0)
-    u_s, u_t = d * inverse, -b * inverse
-    v_s, v_t = -c * inverse, a * inverse
-    along_s = si.dn_du * u_s + si.dn_dv * v_s
-    along_t = si.dn_du * u_t + si.dn_dv * v_t
-    # A surface that bends away from its normal spreads its normals: hence the sign.
-    xx, yy = -dr.dot(along_s, s), -dr.dot(along_t, t)
-    xy = -0.5 * (dr.dot(along_s, t) + dr.dot(along_t, s))
-    mean, half = 0.5 * (xx + yy), 0.5 * (xx - yy)
-    root = dr.sqrt(dr.square(half) + dr.square(xy))
-    first = dr.select(mean >= 0, mean + root, mean - root)
-    second = dr.select(mean >= 0, mean - root, mean + root)
-    angle = 0.5 * dr.atan2(xy, half) + dr.select(mean >= 0, 0, 0.5 * dr.pi)
-    direction = dr.cos(angle) * s + dr.sin(angle) * t
-    # On a sphere every direction is principal: take u rather than rounding noise.
-    direction = dr.select(root > UMBILIC_TOLERANCE * dr.abs(mean), direction, s)
-    flip = dr.select(dr.dot(si.n, hit.rays.d) > 0, -1, 1)
-    usable &= dr.isfinite(first) & dr.isfinite(second)
-    return (
-        dr.select(usable, first * flip, 0),
-        dr.select(usable, second * flip, 0),
-        dr.select(usable, direction, 0),
-    )
 
 
 def _motion(
@@ -152,7 +111,7 @@ def render_gbuffer(
     scalar = is_scalar()
     flags = mi.RayFlags.All
     if wanted & set(SETS["curvature"]):
-        flags = flags | mi.RayFlags.dNSdUV
+        flags = FLAGS
     generator = RayGenerator(camera, resolution)
 
     def values(pixel: Any) -> dict[str, list[Any]]:
@@ -180,7 +139,7 @@ def render_gbuffer(
                 "reflected_shape_id": lambda: scene.shape_ids(mirror.si.shape, mirror.valid),
             }
         if wanted & set(SETS["curvature"]):
-            first, second, direction = _principal_curvatures(hit)
+            first, second, direction = scene.curvature.principal(hit.si, hit.preliminary)
             names |= {
                 "curvature": lambda: mi.Vector2f(first, second),
                 "curvature_direction": lambda: direction,

@@ -72,6 +72,13 @@ class Scene:
         bsdfs = {id(bsdf): bsdf for shape in self.mi_scene.shapes() if (bsdf := shape.bsdf()) is not None}
         return Layers(list(bsdfs.values()))
 
+    @cached_property
+    def curvature(self) -> Any:
+        """`curvature.Curvature` of the shapes."""
+        from gibench.rendering.curvature import Curvature
+
+        return Curvature(list(self.mi_scene.shapes()))
+
     def material_ids(self, bsdf: Any, active: Any) -> Any:
         """Ids (from 1) of an array of BSDF pointers; 0 where not `active`."""
         import drjit as dr
