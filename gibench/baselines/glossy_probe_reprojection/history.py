@@ -1,0 +1,54 @@
+"""What the frame before showed, for pixels that no probe has a sample for.
+
+Rodriguez et al. 2020, section 5.2: their glossy light is that of the last frame, at the place where its camera saw the
+point.
+"""
+
+# mypy: disable-error-code="no-untyped-def, misc"
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+APART = 4.0
+"""Sizes of a pixel by which the point that the earlier camera saw may lie aside of the one that is looked for."""
+
+
+@dataclass
+class Frame:
+    """A frame that was rendered, a lane a pixel in row order.
+
+    camera: from `replay.camera_arrays`. width, height: mi.Int32 of one lane. color: its glossy light, mi.Color3f.
+    position: mi.Point3f, m. material: mi.UInt32. known: mi.Bool, whether the color is one.
+    """
+
+    camera: dict[str, Any]
+    width: Any
+    height: Any
+    color: Any
+    position: Any
+    material: Any
+    known: Any
+
+
+def recalled(frame: Frame, point: Any, material: Any, active: Any) -> tuple[Any, Any]:
+    """Glossy light of points in an earlier frame, mi.Color3f, and whether that frame saw them, mi.Bool.
+
+    point: mi.Point3f, m. material: mi.UInt32, of their surfaces.
+    """
+    offset = point - frame.camera["_origin"]
+    right, down, depth = (dr.dot(axis, offset) for axis in frame.camera["_axes"])
+    active = active & (depth > 0)
+    pixel = depth * frame.camera["_scale"]
+    at = mi.Point2f(right, down) / dr.select(active, pixel, 1) + frame.camera["_centre"]
+    active &= (at.x >= 0) & (at.y >= 0) & (at.x < frame.width) & (at.y < frame.height)
+    column, row = mi.Int32(dr.select(active, at.x, 0)), mi.Int32(dr.select(active, at.y, 0))
+    lane = mi.UInt32(row * frame.width + column)
+    seen = active & dr.gather(mi.Bool, frame.known, lane, active)
+    seen &= dr.gather(mi.UInt32, frame.material, lane, active) == material
+    there = dr.gather(mi.Point3f, frame.position, lane, active)
+    seen &= dr.norm(there - point) <= APART * pixel
+    return dr.gather(mi.Color3f, frame.color, lane, seen), seen
