@@ -33,6 +33,11 @@ class FirstHits:
     active: Any
     emission: Any
 
+    @property
+    def normal(self) -> Any:
+        """Unit mi.Vector3f, the shading normal towards the viewer; 0 on a miss."""
+        return dr.select(self.active, mi.Vector3f(dr.mulsign(self.si.sh_frame.n, self.si.wi.z)), 0)
+
 
 def first_hits(
     scene: Scene, camera: PinholeCamera, resolution: tuple[int, int], *, grid: int = 1

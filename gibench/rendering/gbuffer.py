@@ -39,10 +39,14 @@ def mirror_direction(si: Any, towards: Any) -> Any:
     return dr.normalize(dr.select(leaves, shading, face))
 
 
-class _Hit:
-    """The first hit of each pixel, with what several channels share."""
+class Hit:
+    """What rays hit, with what several channels share.
+
+    rays: mi.Ray3f. si: mi.SurfaceInteraction3f. valid: whether there is something. bsdf: mi.BSDFPtr.
+    """
 
     def __init__(self, scene: Scene, rays: Any, flags: Any) -> None:
+        """flags: mi.RayFlags, what is computed of the surface."""
         self.scene = scene
         self.rays = rays
         self.preliminary = scene.mi_scene.ray_intersect_preliminary(rays, coherent=True)
@@ -57,20 +61,22 @@ class _Hit:
 
     @property
     def normal(self) -> Any:
+        """Unit mi.Vector3f, the shading normal on the side that the ray came from; 0 on a miss."""
         return self.facing(shading_normal(self.si))
 
-    def mirrored(self) -> _Hit:
+    def mirrored(self) -> Hit:
         """The hit of the mirror ray."""
         rays = self.si.spawn_ray(mirror_direction(self.si, self.rays.d))
         rays.maxt = dr.select(self.valid, rays.maxt, 0)
-        return _Hit(self.scene, rays, mi.RayFlags.All)
+        return Hit(self.scene, rays, mi.RayFlags.All)
 
     def masked(self, value: Any) -> Any:
+        """`value`, 0 on a miss."""
         return dr.select(self.valid, value, 0)
 
 
 def _motion(
-    hit: _Hit, pixel: Any, previous: PinholeCamera | None, resolution: tuple[int, int]
+    hit: Hit, pixel: Any, previous: PinholeCamera | None, resolution: tuple[int, int]
 ) -> tuple[Any, Any]:
     """Offset (pixels) to where the earlier camera saw the point, and whether it did see it there."""
     if previous is None:
@@ -115,7 +121,7 @@ def render_gbuffer(
     generator = RayGenerator(camera, resolution)
 
     def values(pixel: Any) -> dict[str, list[Any]]:
-        hit = _Hit(scene, generator.rays(pixel), flags)
+        hit = Hit(scene, generator.rays(pixel), flags)
         names: dict[str, Callable[[], Any]] = {
             "position": lambda: hit.masked(hit.si.p),
             "normal": lambda: hit.normal,

@@ -30,7 +30,7 @@ def _gbuffer(scene, lightmap, camera, width: int, height: int):
     surfaces = {
         "glossy": hits.active & ((hits.bsdf.flags() & NOT_DIFFUSE) != 0),
         "position": dr.select(hits.active, mi.Point3f(hits.si.p), 0),
-        "normal": dr.select(hits.active, mi.Vector3f(dr.mulsign(hits.si.sh_frame.n, hits.si.wi.z)), 0),
+        "normal": hits.normal,
         "material": scene.material_ids(hits.bsdf, hits.active),
     }
     dr.eval(hits.preliminary, seen, surfaces)

@@ -1,15 +1,15 @@
 """What the probes see, rendered into their maps.
 
-Four bakes, so that a method pays for what it reads: where the probes stand, the glossy radiance, the visible surface
-and the reflected one (Rodriguez et al. 2020, section 4.1). All probes share the passes: a lane is a path through a
-texel of any probe.
+Five bakes, so that a method pays for what it reads: where the probes stand, the glossy radiance, all of the light, the
+visible surface and the reflected one (Rodriguez et al. 2020, section 4.1). All probes share the passes: a lane is a
+path through a texel of any probe.
 """
 
 # mypy: disable-error-code="no-untyped-def, misc"
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,13 +24,13 @@ from gibench.baselines.probes.adaptive import parameterization
 from gibench.baselines.probes.adaptive.parameterization import CELLS, GUIDE_MAPS, GUIDES, parameterize
 from gibench.baselines.probes.adaptive.warp import Warp
 from gibench.baselines.probes.errors import ProbeError
-from gibench.baselines.probes.mappings import ADAPTIVE, MAPPINGS
+from gibench.baselines.probes.mappings import ADAPTIVE, MAPPINGS, LatLong, Octahedral
 from gibench.baselines.probes.narrowed import NarrowedMaterials
 from gibench.baselines.replay import Replay
 from gibench.datasets.exr import fits_half
 from gibench.rendering import surface
 from gibench.rendering.denoise import denoise
-from gibench.rendering.gbuffer import _Hit as Hit
+from gibench.rendering.gbuffer import Hit
 from gibench.rendering.integrator import scatter_paths
 from gibench.rendering.render import MAX_DEPTH
 from gibench.rendering.sampling import IndependentSampler
@@ -45,12 +45,13 @@ LANES = 1 << 22
 SEED = 0
 """Probes are part of the scene to all methods and seeds."""
 
-POSITIONS, RADIANCE, VISIBLE, REFLECTED = "positions", "radiance", "visible", "reflected"
+POSITIONS, RADIANCE, LIGHT, VISIBLE, REFLECTED = "positions", "radiance", "light", "visible", "reflected"
 FORWARD, INVERSE = "forward", "inverse"
 """Files of the bake `parameterization`."""
 
 MAPS: dict[str, tuple[str, int, type]] = {
     "radiance": (RADIANCE, 3, np.float16),
+    "light": (LIGHT, 3, np.float16),
     "distance": (VISIBLE, 1, np.float32),
     "normal": (VISIBLE, 3, np.float16),
     "roughness": (VISIBLE, 1, np.float16),
@@ -58,10 +59,11 @@ MAPS: dict[str, tuple[str, int, type]] = {
     "reflected_position": (REFLECTED, 3, np.float32),
     "reflected_material_id": (REFLECTED, 1, np.uint16),
 }
-"""Map → the bake it lies in, components and type on disk. The radiance becomes float32 where half cannot hold it."""
+"""Map → the bake it lies in, components and type on disk. Radiance and light become float32 where half cannot hold
+them."""
 
 MARGIN = 32
-"""Columns from the other end of a map that its denoiser sees at either end."""
+"""Texels beyond the edges of a map that its denoiser sees."""
 
 
 @dataclass(frozen=True)
@@ -103,6 +105,11 @@ class ProbeSettings:
             int(settings["probe_spp"]),
             bool(settings["probe_denoise"]),
         )
+
+    def octahedral(self, multiple: int) -> ProbeSettings:
+        """The same on square octahedral maps of about as many texels, a multiple of `multiple` along a side."""
+        side = multiple * max(round((self.width * self.height) ** 0.5 / multiple), 1)
+        return replace(self, width=side, height=side, mapping="octahedral")
 
 
 def _rays(positions, mapping, warp: Warp | None, lane, inside: Any):
@@ -162,6 +169,14 @@ class _Baker:
                 flat[name][first : first + count] = np.stack(parts, axis=-1)
 
     def radiance(self, first, seed, texels: int) -> dict[str, Any]:
+        """Glossy light alone."""
+        return {"radiance": self._sums(first, seed, texels, "specular")}
+
+    def light(self, first, seed, texels: int) -> dict[str, Any]:
+        """All light, emission and environment included."""
+        return {"light": self._sums(first, seed, texels, "all")}
+
+    def _sums(self, first, seed, texels: int, lobes: str) -> list[Any]:
         spp = self.settings.spp
         sampler = IndependentSampler()
         sampler.independent.seed(seed, texels * spp)
@@ -177,19 +192,22 @@ class _Baker:
             si.bsdf(ray) if narrowed is None else narrowed.at(si),
             mi.Bool(True),
             max_depth=MAX_DEPTH,
-            lobes="specular",
+            lobes=lobes,
             portals=self.scene.portals,
             layers=(self.scene if narrowed is None else narrowed).layers,
         )
         value = path.direct_specular + path.indirect_specular
+        if lobes == "all":
+            value += path.direct_diffuse + path.indirect_diffuse
+            value += si.emitter(self.scene.mi_scene).eval(si)
         value = dr.select(dr.all(dr.isfinite(value)), value * share, 0)
         dr.eval(value)
         sums = [dr.block_sum(part, spp) for part in value]
         dr.eval(sums)
-        return {"radiance": sums}
+        return sums
 
     def surfaces(self, names: tuple[str, ...]) -> Callable[..., dict[str, Any]]:
-        """A kernel that samples these maps, and `specular_albedo`, at the centres of texels."""
+        """A kernel that samples these maps, and the two albedos, at the centres of texels."""
 
         def kernel(first, seed, texels: int) -> dict[str, Any]:
             lane = dr.arange(mi.UInt32, texels) + first
@@ -201,6 +219,7 @@ class _Baker:
                 "normal": lambda: list(hit.normal),
                 "roughness": lambda: surface.roughness(self.scene, hit.bsdf, hit.si, hit.valid),
                 "material_id": lambda: self.scene.material_ids(hit.bsdf, hit.valid),
+                "albedo": lambda: list(surface.albedo(self.scene, hit.bsdf, hit.si, hit.valid)),
                 "specular_albedo": lambda: list(
                     surface.specular_albedo(self.scene, hit.bsdf, hit.si, hit.valid)
                 ),
@@ -232,36 +251,40 @@ def _bake_surfaces(baker: _Baker, part: str, folder: Path) -> None:
 
 
 def _denoised(
-    radiance: NDArray[np.float32], guides: Mapping[str, NDArray[np.float32]]
+    radiance: NDArray[np.float32], guides: Mapping[str, NDArray[np.float32]], mapping: LatLong | Octahedral
 ) -> NDArray[np.float32]:
-    """One map (H, W, 3), denoised as if it went on beyond its left and right edge."""
-    margin = min(MARGIN, radiance.shape[1])
+    """One map (H, W, 3), denoised as if it went on beyond its edges."""
+    height, width = radiance.shape[:2]
+    margin = min(MARGIN, width, height)
+    denoised = denoise(
+        mapping.surrounded(radiance, margin),
+        **{name: mapping.surrounded(guide, margin) for name, guide in guides.items()},
+    )
+    rows = (denoised.shape[0] - height) // 2
+    return denoised[rows : rows + height, margin : margin + width]
 
-    def around(image: NDArray[np.float32]) -> NDArray[np.float32]:
-        return np.concatenate([image[:, -margin:], image, image[:, :margin]], axis=1)
 
-    return denoise(around(radiance), **{name: around(guide) for name, guide in guides.items()})[
-        :, margin:-margin
-    ]
-
-
-def _bake_radiance(baker: _Baker, folder: Path) -> None:
+def _bake_radiance(baker: _Baker, part: str, folder: Path) -> None:
+    """The map `part`, RADIANCE or LIGHT, denoised by the albedo of what it reflects."""
     settings = baker.settings
     shape = (baker.count, settings.height, settings.width, 3)
     raw = _new(folder, "raw", shape, np.float32)
-    baker.run(baker.radiance, settings.spp, {"radiance": raw})
+    kernels = {
+        RADIANCE: (baker.radiance, ("specular_albedo",)),
+        LIGHT: (baker.light, ("albedo", "specular_albedo")),
+    }
+    kernel, albedos = kernels[part]
+    baker.run(kernel, settings.spp, {part: raw})
     if settings.denoise:
-        guides = {
-            "normal": np.zeros(shape, dtype=np.float32),
-            "specular_albedo": np.zeros(shape, dtype=np.float32),
-        }
+        guides = {name: np.zeros(shape, dtype=np.float32) for name in ("normal", *albedos)}
         baker.run(baker.surfaces(tuple(guides)), 1, guides)
-        albedo, normal = np.clip(guides["specular_albedo"], 0, 1), guides["normal"]
+        albedo = np.clip(sum(guides[name] for name in albedos), 0, 1)
         for k in range(len(raw)):
-            raw[k] = _denoised(np.asarray(raw[k]), {"albedo": albedo[k], "normal": normal[k]})
+            guide = {"albedo": albedo[k], "normal": guides["normal"][k]}
+            raw[k] = _denoised(np.asarray(raw[k]), guide, baker.mapping)
     # Radiance is compared with the mean of its map: what is far below it may lose digits.
     half = all(fits_half(np.asarray(one), dark=float(one.mean())) for one in raw)
-    final = _new(folder, "radiance", shape, np.float16 if half else np.float32)
+    final = _new(folder, part, shape, np.float16 if half else np.float32)
     for k in range(len(raw)):
         final[k] = raw[k]
     final.flush()  # type: ignore[attr-defined]
@@ -338,7 +361,7 @@ def baked_files(site: Site, settings: ProbeSettings, maps: tuple[str, ...]) -> d
         files |= {name: folder / f"{name}.npy" for name in (FORWARD, INVERSE)}
     for part in dict.fromkeys(MAPS[name][0] for name in maps):
         chosen = {**mapped, "part": part}
-        if part == RADIANCE:
+        if part in (RADIANCE, LIGHT):
             chosen |= {"spp": settings.spp, "denoise": settings.denoise, "max_depth": MAX_DEPTH}
             if settings.first_roughness != 1:
                 chosen["first_roughness"] = settings.first_roughness
@@ -347,8 +370,8 @@ def baked_files(site: Site, settings: ProbeSettings, maps: tuple[str, ...]) -> d
             narrowed = _first_materials(site, settings) if part == RADIANCE else None
             warp = load_warp(settings, files)
             baker = _Baker(site.scene, np.load(where), settings, materials=narrowed, warp=warp)
-            if part == RADIANCE:
-                _bake_radiance(baker, folder)
+            if part in (RADIANCE, LIGHT):
+                _bake_radiance(baker, part, folder)
             else:
                 _bake_surfaces(baker, part, folder)
 

@@ -12,6 +12,8 @@ from typing import Any
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
 
 POLE = 1e-12
 """Squared distance from the axis, of a direction whose largest component is 1, below which it is the pole itself and
@@ -74,6 +76,10 @@ class LatLong:
         column = dr.select(column >= width, column - width, column)
         return column, dr.clip(row, 0, height - 1)
 
+    def surrounded(self, image: NDArray[Any], margin: int) -> NDArray[Any]:
+        """An image (height, width, C) with `margin` columns more at either side, those of the other end."""
+        return np.concatenate([image[:, -margin:], image, image[:, :margin]], axis=1)
+
 
 @dataclass(frozen=True)
 class Octahedral:
@@ -124,6 +130,11 @@ class Octahedral:
         folded_row = dr.select(aside, height - 1 - row, row)
         folded_column = dr.select(across, width - 1 - column, column)
         return dr.clip(folded_column, 0, width - 1), dr.clip(folded_row, 0, height - 1)
+
+    def surrounded(self, image: NDArray[Any], margin: int) -> NDArray[Any]:
+        """An image (height, width, C) with `margin` texels more all around, those that touch there on the sphere."""
+        wide = np.concatenate([image[::-1, margin - 1 :: -1], image, image[::-1, : -margin - 1 : -1]], axis=1)
+        return np.concatenate([wide[margin - 1 :: -1, ::-1], wide, wide[: -margin - 1 : -1, ::-1]], axis=0)
 
 
 ADAPTIVE = "adaptive"

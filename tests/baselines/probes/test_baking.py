@@ -18,6 +18,7 @@ from tests.baselines.sites import emitted, lit_box, site, where_rays_leave
 from tests.rendering import scenes
 
 MIRROR = {"type": "conductor", "material": "none", "specular_reflectance": scenes.rgb(0.8)}
+OCTAHEDRAL = {"width": 48, "height": 48, "mapping": "octahedral"}
 START = 1e-3
 """Mitsuba starts secondary rays a little above the surface: 9e-5 of its largest coordinate."""
 
@@ -119,6 +120,36 @@ def test_without_gloss_there_is_nothing(tmp_path):
         assert not np.array(probes.arrays["radiance"]).any()
 
 
+def test_light_is_all_that_is_seen(tmp_path):
+    """Walls that emit and reflect nothing, a mirror for a floor, and a sky through the open side."""
+    description = lit_box(MIRROR)
+    del description["wall0+"]
+    description["sky"] = {"type": "constant", "radiance": scenes.rgb(7.0)}
+    probes = load_probes(
+        site(load_dict(description), tmp_path),
+        settings(width=32, height=32, mapping="octahedral"),
+        ("light",),
+    )
+    d = texel_directions(probes)
+    for probe in range(probes.count):
+        point = columns(probes.position(mi.UInt32(probe)))[0].astype(float)
+        corners = [seen_from(point, texel_directions(probes, x, y)) for x in (0, 1) for y in (0, 1)]
+        faces = np.array([corner[1] for corner in corners])
+        mirrored = np.array([corner[4] for corner in corners])
+        floor = (faces == (2, -1)).all(axis=2)
+        # What a texel sees: another face by way of the floor.
+        seen = np.where(floor[..., None], mirrored, faces)
+        known = (seen == seen[0]).all(axis=(0, 2)) & (floor == floor[0]).all(axis=0)
+        light = {(0, 1): (7.0, 7.0, 7.0)}
+        expected = np.array([light.get(tuple(which), (0, 0, 0)) for which in seen[0]])
+        inside = ~(seen[0] == (0, 1)).all(axis=1)
+        expected[inside] = [emitted(*which) for which in seen[0][inside]]
+        expected *= np.where(floor[0], 0.8, 1)[:, None]
+        found = content(probes, "light", probe)
+        assert known.sum() > 0.6 * len(d)
+        np.testing.assert_allclose(found[known], expected[known], rtol=2e-3, atol=1e-6)
+
+
 def test_misses_hold_zero(tmp_path):
     """A box that is open to one side."""
     scene = load_dict(scenes.box("coat"))
@@ -129,8 +160,8 @@ def test_misses_hold_zero(tmp_path):
     for name, (_, size, _) in MAPS.items():
         values = np.array(probes.arrays[name]).reshape(-1, size)
         assert np.isfinite(values).all(), name
-        # Radiance is the mean over a texel, of which the centre alone is known to miss.
-        assert name == "radiance" or not values[missed].any(), name
+        # Light is the mean over a texel, of which the centre alone is known to miss.
+        assert name in ("radiance", "light") or not values[missed].any(), name
     alone = np.array(probes.arrays["reflected_material_id"]) == 0
     assert not np.array(probes.arrays["reflected_position"]).reshape(-1, 3)[alone].any()
 
@@ -200,14 +231,17 @@ def test_huge_radiance_is_kept_in_single_precision(tmp_path):
     assert np.array(probes.arrays["radiance"]).max() == pytest.approx(0.8e6, rel=1e-3)
 
 
-def test_denoising_keeps_the_mean_and_removes_noise(tmp_path):
+@pytest.mark.parametrize(
+    ("name", "shape"), [("radiance", {"width": 64, "height": 32}), ("light", OCTAHEDRAL)]
+)
+def test_denoising_keeps_the_mean_and_removes_noise(tmp_path, name, shape):
     scene = load_dict(scenes.box("metal"))
     where = site(scene, tmp_path)
     noisy, clean, truth = (
-        load_probes(where, settings(count=2, width=64, height=32, spp=spp, denoise=denoise), ("radiance",))
+        load_probes(where, settings(count=2, spp=spp, denoise=denoise, **shape), (name,))
         for spp, denoise in ((4, False), (4, True), (1024, False))
     )
-    maps = [np.log1p(np.array(p.arrays["radiance"]).astype(float)) for p in (noisy, clean, truth)]
+    maps = [np.log1p(np.array(p.arrays[name]).astype(float)) for p in (noisy, clean, truth)]
     errors = [np.mean((found - maps[2]) ** 2) for found in maps[:2]]
     assert errors[1] < 0.7 * errors[0]
     assert maps[1].mean() == pytest.approx(maps[2].mean(), rel=0.1)

@@ -141,3 +141,28 @@ def test_no_direction_and_tiny_ones_have_a_texel(mapping):
     assert ((at >= 0) & (at <= [mapping.width, mapping.height])).all()
     unit = np.array([[0, 0, 1], [0, 0, 1], [1, 0, 0], [-1, 1, -1], [0, 1, 1]])
     np.testing.assert_allclose(at, columns(mapping.coordinates(vectors(unit))), atol=1e-4 * mapping.width)
+
+
+@pytest.mark.parametrize("mapping", [LatLong(16, 8), Octahedral(16, 16)], ids=lambda mapping: mapping.name)
+def test_what_surrounds_a_map_touches_it_on_the_sphere(mapping):
+    """Directions of the texels as an image: beyond the edge they go on in steps as small as within."""
+    row, column = np.indices((mapping.height, mapping.width))
+    middles = mi.Point2f(mi.Float(column.ravel() + 0.5), mi.Float(row.ravel() + 0.5))
+    image = columns(mapping.direction(middles)).reshape(mapping.height, mapping.width, 3)
+    wide = mapping.surrounded(image, 3)
+    above = (wide.shape[0] - mapping.height) // 2
+    assert wide.shape[1] == mapping.width + 6
+    np.testing.assert_array_equal(wide[above : above + mapping.height, 3:-3], image)
+    across = np.linalg.norm(np.diff(wide, axis=1), axis=2)
+    assert across.max() <= 1.001 * np.linalg.norm(np.diff(image, axis=1), axis=2).max()
+    down = np.linalg.norm(np.diff(wide, axis=0), axis=2)
+    assert down.max() <= 1.001 * np.linalg.norm(np.diff(image, axis=0), axis=2).max()
+
+
+def test_an_octahedral_map_is_surrounded_by_the_texels_that_a_lookup_wraps_to():
+    mapping = Octahedral(8, 8)
+    numbers = np.arange(64).reshape(8, 8, 1)
+    wide = mapping.surrounded(numbers, 1)[..., 0]
+    for row, column in [(-1, 3), (8, 0), (5, -1), (2, 8)]:
+        x, y = mapping.wrapped(mi.Int32(column), mi.Int32(row))
+        assert wide[row + 1, column + 1] == 8 * y[0] + x[0]
