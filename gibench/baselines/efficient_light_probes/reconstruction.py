@@ -73,8 +73,7 @@ class Reconstruction(ReflectionSearch):
         trained = trained_network(site, plan, METHOD.baked_settings(self.settings), made)
         self.scale, self.epoch = trained.scale, trained.epoch
         device = "cuda" if dr.backend_v(mi.Float) == dr.JitBackend.CUDA else "cpu"
-        network = trained.network.eval().requires_grad_(False)
-        self.network = network.to(device, memory_format=torch.channels_last)
+        self.network = trained.network.eval().requires_grad_(False).to(device)
 
     def forget(self) -> None:
         """Begin another path."""

@@ -184,8 +184,7 @@ class Training:
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(plan.seed)
             network = ReconstructionNetwork(plan.fusion)
-        # Channels last: convolutions of few channels take three quarters of the time.
-        self.network = network.to(self.device, memory_format=torch.channels_last)
+        self.network = network.to(self.device)
         self.optimiser = torch.optim.Adam(self.network.parameters(), lr=RATE)
         self.judge = build_network("vgg").to(self.device) if plan.lpips else None
         self.epoch = 0
@@ -237,7 +236,7 @@ class Training:
                 group["lr"] = RATE * 0.5 * (1 + math.cos(math.pi * progress))
             loss = self._loss([self.learned[k] for k in chosen], generator)
             self.optimiser.zero_grad(set_to_none=True)
-            loss.backward()  # type: ignore[no-untyped-call]
+            loss.backward()
             nn.utils.clip_grad_norm_(self.network.parameters(), LARGEST_GRADIENT)
             self.optimiser.step()
             total += float(loss.detach())
