@@ -43,16 +43,14 @@ class BakeCache:
         self.root, self._scene, self._machine = root, scene, dict(machine)
         self.used: list[Bake] = []
 
-    def get(self, kind: str, settings: Mapping[str, Any], make: Callable[[Path], None]) -> Bake:
+    def get(self, kind: str, settings: Mapping[str, Any], make: Callable[[Path], float | None]) -> Bake:
         """The bake of these settings, made by `make(folder)` where it is not there yet.
 
         kind: "lightmap", "probes" …, what its time is booked under. settings: all that decides the content beside
         the scene, JSON-able; a version number of the code that makes it among them. A half-made bake is never
-        taken for a whole one.
+        taken for a whole one. make: may return seconds that were spent on it before, in a run that was cut off.
         """
-        key = {"kind": kind, "settings": dict(settings), "scene": self._scene, "machine": self._machine}
-        digest = hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()[:24]
-        folder = self.root / f"{kind}-{digest}"
+        key, folder = self._place(kind, settings)
         if not (folder / RECORD).is_file():
             self._make(folder, key, make)
         record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
@@ -61,16 +59,29 @@ class BakeCache:
             self.used.append(bake)
         return bake
 
-    def _make(self, folder: Path, key: dict[str, Any], make: Callable[[Path], None]) -> None:
+    def checkpoint(self, kind: str, settings: Mapping[str, Any]) -> Path:
+        """A file beside the bake of these settings for what its making must not lose when it is killed.
+
+        Whoever writes it removes it once the bake is there.
+        """
+        _, folder = self._place(kind, settings)
+        return folder.with_name(f".{folder.name}.checkpoint")
+
+    def _place(self, kind: str, settings: Mapping[str, Any]) -> tuple[dict[str, Any], Path]:
+        key = {"kind": kind, "settings": dict(settings), "scene": self._scene, "machine": self._machine}
+        digest = hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()[:24]
+        return key, self.root / f"{kind}-{digest}"
+
+    def _make(self, folder: Path, key: dict[str, Any], make: Callable[[Path], float | None]) -> None:
         partial = folder.with_name(f".{folder.name}.partial-{os.getpid()}")
         shutil.rmtree(partial, ignore_errors=True)
         partial.mkdir(parents=True)
         try:
             synchronise()
             start = time.perf_counter()
-            make(partial)
+            before = make(partial) or 0.0
             synchronise()
-            seconds = time.perf_counter() - start
+            seconds = before + time.perf_counter() - start
             size = sum(path.stat().st_size for path in partial.rglob("*") if path.is_file())
             (partial / RECORD).write_bytes(as_json({"key": key, "seconds": seconds, "bytes": size}))
             sync_tree(partial)

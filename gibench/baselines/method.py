@@ -9,7 +9,7 @@ from __future__ import annotations
 import difflib
 import importlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -52,6 +52,17 @@ class Knob:
 
 
 @dataclass(frozen=True)
+class Variant:
+    """A method with other defaults, such as one of its parts switched off, that has a row of its own.
+
+    name: what its id ends in, after a colon. settings: knobs that differ.
+    """
+
+    name: str
+    settings: Mapping[str, Setting]
+
+
+@dataclass(frozen=True)
 class Method:
     """The card of a method.
 
@@ -59,7 +70,7 @@ class Method:
     is ("probes", "ray tracing" …). paper: where it is from. implementation: "package.module:Class", an
     `Implementation`, imported only to run it. channels: of the training views that it reads. knobs: its settings.
     budget: the knob that equal-time comparisons turn. trained: draws random numbers while it is prepared, so that
-    several seeds say more than one.
+    several seeds say more than one. variants: the ablations that its paper shows, methods of their own on a board.
     """
 
     id: str
@@ -72,6 +83,23 @@ class Method:
     knobs: tuple[Knob, ...] = ()
     budget: str | None = None
     trained: bool = False
+    variants: tuple[Variant, ...] = ()
+
+    def with_variants(self) -> tuple[Method, ...]:
+        """This method and its variants, each a card of its own. Raises MethodError for settings that do not exist."""
+        return (self, *(self._variant(variant) for variant in self.variants))
+
+    def _variant(self, variant: Variant) -> Method:
+        self.settings(variant.settings)
+        return replace(
+            self,
+            id=f"{self.id}:{variant.name}",
+            title=f"{self.title} ({variant.name.replace('-', ' ')})",
+            knobs=tuple(
+                replace(knob, default=variant.settings.get(knob.name, knob.default)) for knob in self.knobs
+            ),
+            variants=(),
+        )
 
     def settings(self, given: Mapping[str, Setting] | None = None) -> dict[str, Setting]:
         """All knobs, those that are not given at their defaults.

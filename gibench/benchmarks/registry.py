@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 
-from gibench.baselines.method import Method
+from gibench.baselines.method import Method, MethodError
 from gibench.benchmarks.errors import RegistryError
 
 GROUP = "gibench.methods"
@@ -87,6 +87,10 @@ def _load(point: EntryPoint) -> Found | Broken:
         return Broken(point.name, package, f"{point.value} raises {type(problem).__name__}: {reason}")
     if not isinstance(method, Method):
         return Broken(point.name, package, f"{point.value} is no gibench.baselines.method.Method")
+    try:
+        method.with_variants()
+    except MethodError as problem:
+        return Broken(point.name, package, f"{point.value}: {problem}")
     return Found(method, package, version)
 
 
@@ -98,7 +102,8 @@ def registry_of(points: Iterable[EntryPoint]) -> Registry:
         if isinstance(loaded, Broken):
             broken.append(loaded)
         else:
-            methods.setdefault(loaded.method.id, []).append(loaded)
+            for method in loaded.method.with_variants():
+                methods.setdefault(method.id, []).append(replace(loaded, method=method))
     return Registry({id: tuple(claims) for id, claims in methods.items()}, tuple(broken))
 
 

@@ -109,6 +109,10 @@ class _Session:
     def run(self) -> None:
         task = self.task
         started = time.perf_counter()
+        # Read when torch is loaded. Its threads then sleep while they wait: one that spins keeps a renderer's, or
+        # another process's, from what it is waiting for.
+        os.environ.setdefault("OMP_NUM_THREADS", str(task.threads))
+        os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
         from gibench.rendering import backend
         from gibench.rendering.scene import load_scene
 

@@ -155,7 +155,9 @@ def tell_methods(track: str | None) -> None:
             if track is not None and load_track(track).id not in method.tracks:
                 continue
             typer.echo(f"method {id}: {method.title} ({method.family}; {found.package} {found.version})")
-            for knob in method.knobs:
+            plain = registry.methods.get(id.partition(":")[0], ()) if ":" in id else ()
+            same = {knob for one in plain for knob in one.method.knobs}  # a variant's list is what it changes
+            for knob in (knob for knob in method.knobs if knob not in same):
                 values = " ".join(f"[{v}]" if v == knob.default else str(v) for v in knob.values)
                 typer.echo(f"  {knob.name:<16} {values}")
         if len(claims) > 1:

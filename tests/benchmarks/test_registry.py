@@ -4,8 +4,11 @@ from importlib.metadata import EntryPoint
 
 import pytest
 
+from gibench.baselines.method import Variant
 from gibench.benchmarks.errors import RegistryError
 from gibench.benchmarks.registry import GROUP, registry_of
+from gibench.benchmarks.settings import choices
+from gibench.benchmarks.track import MethodPlan
 from tests.benchmarks import toys
 
 METHOD = toys.card("Constant")
@@ -82,3 +85,29 @@ def test_listing_loads_neither_torch_nor_mitsuba():
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
     assert done.stdout.splitlines()[-1] == "heavy: []", done.stdout + done.stderr
     assert "track walkthrough" in done.stdout
+
+
+WITH_VARIANTS = toys.card(
+    "Styled", knobs=(toys.STYLE, toys.SHADE), variants=(Variant("fancy", {"style": "fancy"}),)
+)
+WRONG_VARIANT = toys.card(
+    "Constant", id="wrong", knobs=(toys.STYLE,), variants=(Variant("x", {"style": "odd"}),)
+)
+
+
+def test_variants_are_methods_with_other_defaults():
+    registry = registry_of([point("styled", f"{HERE}:WITH_VARIANTS", "mine")])
+    assert [found.method.id for found in registry.on_track("walkthrough")] == ["styled", "styled:fancy"]
+    variant = registry.get("styled:fancy").method
+    assert variant.settings() == {"style": "fancy", "shade": 1.0}
+    assert variant.title == f"{WITH_VARIANTS.title} (fancy)"
+    assert variant.implementation == WITH_VARIANTS.implementation
+    assert registry.get("styled:fancy").package == "mine"
+    assert choices(variant, MethodPlan(), {})[0].label == "styled:fancy"
+
+
+def test_a_variant_of_no_setting_is_named():
+    registry = registry_of([point("wrong", f"{HERE}:WRONG_VARIANT", "mine")])
+    assert "wrong" not in registry.methods
+    with pytest.raises(RegistryError, match="style = 'odd' is not allowed"):
+        registry.get("wrong")

@@ -3,6 +3,7 @@
 # mypy: disable-error-code="no-untyped-def, misc"
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, ClassVar
 
@@ -38,14 +39,17 @@ def _gbuffer(scene, lightmap, camera, width: int, height: int):
 
 
 def _mirrored(scene, _lightmap, camera, preliminary, glossy, width: int, height: int):
-    """What each glossy hit would reflect if it were a mirror: the point, or the direction where that is nothing."""
+    """What each glossy hit would reflect if it were a mirror: the point, or the direction where that is nothing.
+
+    And the mi.PreliminaryIntersection3f of it.
+    """
     hits = hits_of_rays(scene, ray_generator(camera), (width, height), preliminary)
     ray = hits.si.spawn_ray(mirror_direction(hits.si, hits.ray.d))
     found = scene.mi_scene.ray_intersect_preliminary(ray, coherent=False, active=glossy)
     far = ~found.is_valid()
     target = dr.select(far, mi.Point3f(ray.d), ray(dr.select(far, 0, found.t)))
-    dr.eval(target, far)
-    return target, far
+    dr.eval(target, far, found)
+    return target, far, found
 
 
 def _searched(probes: Probes, camera, surfaces, target, far, size, count: int, steps, tolerance):
@@ -61,6 +65,29 @@ def _searched(probes: Probes, camera, surfaces, target, far, size, count: int, s
     return color, made
 
 
+@dataclass
+class Searched:
+    """What a search finds, a lane a camera ray in row order.
+
+    preliminary, mirrored: mi.PreliminaryIntersection3f of camera ray and mirror ray. surfaces: "glossy", "position",
+    "normal" and "material" of the first hits. seen: mi.Color3f, all light but the glossy one, specular: that. made:
+    steps of the searches.
+    """
+
+    preliminary: Any
+    mirrored: Any
+    surfaces: dict[str, Any]
+    seen: Any
+    specular: Any
+    made: Any
+
+    @property
+    def effort(self) -> dict[str, float]:
+        """Steps that the searches of a glossy camera ray took together, in the mean."""
+        count = dr.count(self.surfaces["glossy"])[0]
+        return {"search_steps": float(dr.sum(mi.Float(self.made))[0]) / count if count else 0.0}
+
+
 class ReflectionSearch(OnLightmap):
     """See `gibench.baselines.efficient_light_probes.SEARCH`."""
 
@@ -73,17 +100,14 @@ class ReflectionSearch(OnLightmap):
         self.probes = probes.count
         self.kernels["search"] = Replay(site.scene, partial(_searched, probes), probes.arrays)
 
-    def render(self, view: View, stages: Stages) -> Prediction:
-        """First hits, what they mirror, and the light of the probes where those mirror the same."""
-        grid, fine = self.grid, self.fine(view)
-        camera = camera_arrays(view.camera, fine)
+    def searched(self, camera: dict[str, Any], fine: tuple[int, int], stages: Stages) -> Searched:
+        """Search a frame. camera: from `camera_arrays`, of a grid of fine = (width, height) rays."""
         with stages.stage("g-buffer"):
             preliminary, seen, surfaces = self.kernels["g-buffer"](camera, *fine)
-            base = averaged(seen, fine, grid)
         with stages.stage("ray casting"):
-            target, far = self.kernels["mirror"](camera, preliminary, surfaces["glossy"], *fine)
+            target, far, mirrored = self.kernels["mirror"](camera, preliminary, surfaces["glossy"], *fine)
         with stages.stage("search"):
-            color, made = self.kernels["search"](
+            specular, made = self.kernels["search"](
                 camera,
                 surfaces,
                 target,
@@ -93,11 +117,12 @@ class ReflectionSearch(OnLightmap):
                 dr.opaque(mi.UInt32, int(self.settings["steps"])),
                 dr.opaque(mi.Float, float(self.settings["tolerance"])),
             )
-            specular = averaged(color, fine, grid)
-        return Prediction(base + specular, specular, extra=_effort(surfaces["glossy"], made))
+        return Searched(preliminary, mirrored, surfaces, seen, specular, made)
 
-
-def _effort(glossy: Any, made: Any) -> dict[str, float]:
-    """Steps that the searches of a glossy camera ray took together, in the mean."""
-    count = dr.count(glossy)[0]
-    return {"search_steps": float(dr.sum(mi.Float(made))[0]) / count if count else 0.0}
+    def render(self, view: View, stages: Stages) -> Prediction:
+        """First hits, what they mirror, and the light of the probes where those mirror the same."""
+        fine = self.fine(view)
+        found = self.searched(camera_arrays(view.camera, fine), fine, stages)
+        with stages.stage("search"):
+            base, specular = (averaged(part, fine, self.grid) for part in (found.seen, found.specular))
+        return Prediction(base + specular, specular, extra=found.effort)

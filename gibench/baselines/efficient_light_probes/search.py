@@ -33,6 +33,7 @@ GRAZING = 1e-4
 
 EDGE_ON = 0.05
 """Cosine of the angle of view down to which a pixel's tangent plane stands for its surface."""
+
 HIDDEN = 4.0
 """Taken from the confidence of a probe that reflects something else; more than any two can differ by."""
 
@@ -157,7 +158,7 @@ def search(
         share = dr.select(holds, dr.minimum(LONGER * share, 1), share * SHORTER)
         done += 1
         # Without a mirror image in the tangent plane there is nowhere to go.
-        searching &= meets & ((value < CONFIDENT) | ~holds)
+        searching &= meets & (value < CONFIDENT)
 
     return point, value, done
 
