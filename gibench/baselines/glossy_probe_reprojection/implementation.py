@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
-from types import SimpleNamespace
 from typing import Any, ClassVar
 
 import drjit as dr
@@ -34,7 +33,8 @@ from gibench.baselines.probes.maps import load_probes
 from gibench.baselines.replay import Replay, camera_arrays, ray_generator
 from gibench.baselines.stages import Stages
 from gibench.rendering import surface
-from gibench.rendering.gbuffer import _principal_curvatures, mirror_direction
+from gibench.rendering.curvature import FLAGS
+from gibench.rendering.gbuffer import mirror_direction
 from gibench.rendering.integrator import NOT_DIFFUSE
 
 LEAST_ENERGY = 0.01
@@ -51,21 +51,26 @@ def _gbuffer(scene, lightmap, camera, width: int, height: int):
     """What was hit, the light it sends out but for glossy light, and what search and filter know of it."""
     hits = hits_of_rays(scene, ray_generator(camera), (width, height))
     seen = hits.emission + lightmap.diffuse(hits.si, hits.preliminary, hits.active)
-    si = hits.preliminary.compute_surface_interaction(hits.ray, mi.RayFlags.All | mi.RayFlags.dNSdUV)
-    bent: Any = SimpleNamespace(si=si, valid=hits.active, rays=hits.ray)
-    first, second, direction = _principal_curvatures(bent)
     surfaces = {
         "glossy": hits.active & ((hits.bsdf.flags() & NOT_DIFFUSE) != 0),
         "position": dr.select(hits.active, mi.Point3f(hits.si.p), 0),
         "normal": dr.select(hits.active, mi.Vector3f(dr.mulsign(hits.si.sh_frame.n, hits.si.wi.z)), 0),
-        "curvature": mi.Vector2f(first, second),
-        "direction": mi.Vector3f(direction),
         "material": scene.material_ids(hits.bsdf, hits.active),
         "roughness": surface.roughness(scene, hits.bsdf, hits.si, hits.active),
         "distance": dr.select(hits.active, hits.si.t, 0),
     }
     dr.eval(hits.preliminary, seen, surfaces)
     return hits.preliminary, seen, surfaces
+
+
+def _bent(scene, camera, preliminary, width: int, height: int):
+    """Principal curvatures of what was hit, and the direction of the first."""
+    ray = hits_of_rays(scene, ray_generator(camera), (width, height), preliminary).ray
+    si = preliminary.compute_surface_interaction(ray, FLAGS)
+    first, second, direction = scene.curvature.principal(si, preliminary, si.is_valid())
+    bent = {"curvature": mi.Vector2f(first, second), "direction": mi.Vector3f(direction)}
+    dr.eval(bent)
+    return bent
 
 
 def _mirrored(scene, _lightmap, camera, preliminary, glossy, width: int, height: int):
@@ -158,6 +163,8 @@ class GlossyProbeReprojection(OnLightmap):
         )
         probes = load_probes(site, asked, MAPS)
         self._positions = np.array(probes.arrays[POSITIONS]).reshape(-1, 3)
+        curvature = site.scene.curvature.arrays
+        self.kernels["curvature"] = Replay(site.scene, partial(_bent, site.scene), curvature)
         table, footprint = Table(probes), Footprint()
         self.kernels["gather"] = Replay(site.scene, partial(_gathered, table), table.arrays)
         self.kernels["history"] = Replay(site.scene, _recalled)
@@ -171,6 +178,7 @@ class GlossyProbeReprojection(OnLightmap):
         unit = dr.opaque(mi.Float, float(knobs["unit"]))
         with stages.stage("g-buffer"):
             preliminary, seen, surfaces = self.kernels["g-buffer"](camera, *fine)
+            surfaces |= self.kernels["curvature"](camera, preliminary, *fine)
             base = averaged(seen, fine, grid)
         with stages.stage("ray casting"):
             mirrored = self.kernels["mirror"](camera, preliminary, surfaces["glossy"], *fine)
