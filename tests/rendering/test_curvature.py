@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 import trimesh
@@ -322,6 +326,33 @@ def test_meshes_beside_other_shapes():
     missed = frame["shape_id"][..., 0] == 0
     assert missed.any()
     assert not frame["curvature"][missed].any()
+
+
+def test_scalar_variant_sees_the_same():
+    code = """
+from gibench.rendering.backend import select_variant
+select_variant({variant!r})
+from gibench.rendering.camera import PinholeCamera
+from gibench.rendering.render import render_frame
+from gibench.rendering.scene import load_dict
+from tests.rendering.test_curvature import cylinder, shape
+scene = load_dict({{
+    "type": "scene",
+    "mesh": shape(cylinder(0.4, 24)),
+    "ball": {{"type": "sphere", "radius": 0.2, "center": [0.7, 0, 0]}},
+}})
+camera = PinholeCamera((0, -3, 0), (0, 0, 0), 0.8)
+frame = render_frame(scene, camera, resolution=(12, 8), channels=["curvature", "curvature_direction"]).arrays
+print(frame["curvature"].ravel().tolist() + abs(frame["curvature_direction"]).ravel().tolist())
+"""
+    found = []
+    for variant in ("scalar_rgb", "auto"):
+        command = [sys.executable, "-c", code.format(variant=variant)]
+        result = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+        assert not result.returncode, result.stderr
+        found.append(json.loads(result.stdout.splitlines()[-1]))
+    assert np.any(found[0])
+    np.testing.assert_allclose(*found, atol=1e-3)
 
 
 def test_tables_of_a_scene_do_not_hold_it():
