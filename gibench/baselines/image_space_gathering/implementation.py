@@ -28,7 +28,7 @@ def _gbuffer(scene, lightmap, camera, width: int, height: int):
         "glossy": glossy,
         "reflectance": directional_albedo(hits.si, hits.bsdf, glossy),
         "position": mi.Point3f(hits.si.p),
-        "normal": hits.normal,
+        "normal": mi.Normal3f(hits.normal),
         "roughness": surface.roughness(scene, hits.bsdf, hits.si, glossy),
         "cosine": dr.abs(hits.si.wi.z),
     }

@@ -40,12 +40,23 @@ def mirror_floor(roughness):
     }
 
 
-def rendered(method, where, **given):
+def rendered(method, where, camera=CAMERA, **given):
     knobs = {name: value for name, value in (SMALL | given).items() if name in {k.name for k in method.knobs}}
     implementation = method.load()(method.settings(knobs))
     implementation.prepare(where)
     stages = Stages()
-    return implementation.render(view(CAMERA), stages), stages
+    return implementation.render(view(camera), stages), stages
+
+
+def true_gloss(scene, spp):
+    """What the reference renderer says of the specular part."""
+    truth = render_frame(scene, CAMERA, resolution=RESOLUTION, spp=spp, channels=["radiance"]).arrays
+    return truth["direct_specular"] + truth["indirect_specular"]
+
+
+def error(found, expected):
+    """Box and wall reflect up to 0.5, the lamp 8: its edge alone would decide a linear mean."""
+    return np.sqrt(np.mean((np.minimum(found.specular, 1) - np.minimum(expected, 1)) ** 2))
 
 
 @pytest.mark.parametrize("roughness", [0.005, 0.05, 0.5])
@@ -53,17 +64,11 @@ def test_nearer_to_the_truth_than_the_nearest_probe(tmp_path, roughness):
     """On a near-mirror the parallax is all there is to get right; on a rough floor there is little of it."""
     scene = load_dict(mirror_floor(roughness))
     where = site(scene, tmp_path)
-    truth = render_frame(scene, CAMERA, resolution=RESOLUTION, spp=1024, channels=["radiance"]).arrays
-    expected = truth["direct_specular"] + truth["indirect_specular"]
-
-    def error(found):
-        # Box and wall reflect up to 0.5, the lamp 8: its edge alone would decide a linear mean.
-        return np.sqrt(np.mean((np.minimum(found.specular, 1) - np.minimum(expected, 1)) ** 2))
-
+    expected = true_gloss(scene, 1024)
     ours, stages = rendered(SEARCH, where)
     naive, _ = rendered(NEAREST, where)
     assert np.isfinite(ours.color).all()
-    assert error(ours) < (0.6 if roughness < 0.1 else 1.0) * error(naive)
+    assert error(ours, expected) < (0.6 if roughness < 0.1 else 1.0) * error(naive, expected)
     assert set(stages.seconds) == {"g-buffer", "ray casting", "search"}
     assert 0 < ours.extra["search_steps"] <= 8 * 20
 

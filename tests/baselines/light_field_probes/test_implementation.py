@@ -12,22 +12,11 @@ from gibench.baselines.light_field_probes import METHOD
 from gibench.baselines.nearest_probe import METHOD as NEAREST
 from gibench.baselines.stages import Stages
 from gibench.rendering.camera import PinholeCamera, RayGenerator
-from gibench.rendering.render import render_frame
 from gibench.rendering.scene import load_dict
+from tests.baselines.efficient_light_probes.test_implementation import SMALL, error, rendered, true_gloss
 from tests.baselines.glossy_rooms import CAMERA, glossy_room
 from tests.baselines.sites import RESOLUTION, emitted, lit_box, site, view, where_rays_leave
 from tests.rendering import scenes
-
-SMALL = {
-    "texels": 8,
-    "lightmap_spp": 64,
-    "lightmap_denoise": False,
-    "probes": 8,
-    "probe_width": 256,
-    "probe_spp": 16,
-    "rays": 1,
-}
-
 
 MIRROR = {"type": "conductor", "material": "none", "specular_reflectance": scenes.rgb(0.8)}
 
@@ -43,31 +32,17 @@ def metal(roughness):
     return {"type": "roughconductor", "material": "none", "distribution": "ggx", "alpha": roughness}
 
 
-def rendered(method, where, camera=CAMERA, **given):
-    knobs = {name: value for name, value in (SMALL | given).items() if name in {k.name for k in method.knobs}}
-    implementation = method.load()(method.settings(knobs))
-    implementation.prepare(where)
-    stages = Stages()
-    return implementation.render(view(camera), stages), stages
-
-
 @pytest.mark.parametrize("roughness", [0.005, 0.5])
 def test_nearer_to_the_truth_than_the_nearest_probe(tmp_path, roughness):
     scene = glossy_room(metal(roughness))
     where = site(scene, tmp_path)
-    truth = render_frame(scene, CAMERA, resolution=RESOLUTION, spp=512, channels=["radiance"]).arrays
-    expected = truth["direct_specular"] + truth["indirect_specular"]
-
-    def error(found):
-        # Box and wall reflect up to 0.5, the lamp 8: its edge alone would decide a linear mean.
-        return np.sqrt(np.mean((np.minimum(found.specular, 1) - np.minimum(expected, 1)) ** 2))
-
+    expected = true_gloss(scene, 512)
     # On a rough floor the lamp is found by chance: rays enough that its noise is not what is compared.
     ours, stages = rendered(METHOD, where, glossy_rays=16, rays=1 if roughness < 0.1 else 4)
     naive, _ = rendered(NEAREST, where)
     assert np.isfinite(ours.color).all()
     assert (ours.color >= 0).all()
-    assert error(ours) < (0.5 if roughness < 0.1 else 0.9) * error(naive)
+    assert error(ours, expected) < (0.5 if roughness < 0.1 else 0.9) * error(naive, expected)
     assert set(stages.seconds) == {"g-buffer", "search", "denoising"}
     assert ours.extra["unknown_rays"] < 0.05
     assert ours.extra["texels_per_ray"] > 1
