@@ -47,7 +47,7 @@ PERCEPTUAL_EVERY, PERCEPTUAL_SIDE = 4, 64
 it looks at in one crop: VGG16 costs more than all else."""
 
 PATIENCE = 0.5
-"""Share of the epochs that may pass without a better image of the held-out view: while steps are large its error swings."""
+"""Share of the epochs that may pass without a better image of the held-out view: it swings while steps are large."""
 
 LOOKS = 50
 """How often the held-out view is looked at, and a checkpoint written, at most."""
