@@ -89,7 +89,7 @@ def where(tmp_path_factory):
 
 
 def test_nearer_to_the_truth_than_the_search_alone(where):
-    method, search = made(METHOD, where, epochs=200), made(SEARCH, where)
+    method, search = made(METHOD, where, epochs=100), made(SEARCH, where)
     errors = {"elp": [], "search": []}
     for view in path():
         truth = render_frame(
@@ -99,7 +99,7 @@ def test_nearer_to_the_truth_than_the_search_alone(where):
             stages = Stages()
             found = one.render(view, stages)
             errors[name].append(np.mean((np.minimum(found.color, 1) - np.minimum(truth, 1)) ** 2))
-    assert np.mean(errors["elp"]) < 0.6 * np.mean(errors["search"])
+    assert np.mean(errors["elp"]) < 0.7 * np.mean(errors["search"])
 
 
 def test_a_path_forgets_what_was_before_it(where):
