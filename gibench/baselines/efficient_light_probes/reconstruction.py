@@ -38,11 +38,22 @@ def _guides(scene, _lightmap, camera, preliminary, mirrored, glossy, width: int,
     return depth, albedo, reflected
 
 
+def _nothing(like: Any) -> Any:
+    """A frame of the same shape, with arrays of its own, that shows no surface."""
+    if isinstance(like, dict):
+        return {name: _nothing(part) for name, part in like.items()}
+    if isinstance(like, (list, tuple)):
+        return type(like)(_nothing(part) for part in like)
+    empty = dr.zeros(type(like), dr.width(like))
+    dr.make_opaque(empty)
+    return empty
+
+
 def as_image(values: Any, resolution: tuple[int, int], grid: int) -> Tensor:
     """Lanes of a grid (width, height) as (C, H, W) float32 on their device, each pixel the mean of grid × grid."""
     width, height = resolution
     parts = list(values) if isinstance(values, (mi.Color3f, mi.Vector3f)) else [values]
-    lanes = torch.stack([part.torch() for part in parts])
+    lanes = torch.stack([part.torch().expand(width * height) for part in parts])
     return lanes.reshape(-1, height // grid, grid, width // grid, grid).mean(dim=(2, 4))
 
 
@@ -102,11 +113,10 @@ class Reconstruction(ReflectionSearch):
         dr.eval(color)
         frame = {name: surfaces[name] for name in ("position", "normal", "material")}
         frame |= {"color": color, "camera": camera}
-        # A path that begins has a past of the same shape without weight, so that the kernel stays the same.
-        past = [(frame, 0.0) for _ in DECAY]
-        past[: len(self._past)] = list(zip(self._past, DECAY, strict=False))
+        # A path that begins has a past without surfaces. Arrays of its own, so that the kernel stays the same.
+        past = [*self._past, *(_nothing(frame) for _ in DECAY)][: len(DECAY)]
         self._past = [frame, *self._past][: len(DECAY)]
-        weighted = [(one, dr.opaque(mi.Float, weight)) for one, weight in past]
+        weighted = [(one, dr.opaque(mi.Float, weight)) for one, weight in zip(past, DECAY, strict=True)]
         return self.kernels["temporal"](frame, weighted, *(dr.opaque(mi.Int32, side) for side in fine))
 
     def render(self, view: View, stages: Stages) -> Prediction:
