@@ -82,15 +82,21 @@ def test_nearer_to_the_truth_than_the_nearest_probe(tmp_path, roughness, halved)
     assert ours.extra["found"] > 0.9
 
 
-def test_adaptive_maps_show_the_same_image(tmp_path):
-    """One probe, whose texels are elsewhere: what differs from the plain map is the noise of its paths."""
+def test_adaptive_maps_show_the_same_image(tmp_path, monkeypatch):
+    """One probe, whose texels are elsewhere: what differs is their noise, and edges, which are finer or coarser."""
+    monkeypatch.setattr(
+        placement, "place", lambda scene, count: np.array([[0.5, 0.6, 0.4]], dtype=np.float32)
+    )
     where = site(saved(mirror_floor(0.1), tmp_path), tmp_path)
-    knobs = CHEAP | {"probes": 1, "probe_spp": 64}
+    knobs = CHEAP | {"probe_spp": 64}
     plain, _ = rendered(GPR, where, **knobs)
     adaptive, _ = rendered(GPR, where, **knobs | {"parameterization": "adaptive"})
+    # What is found mirrors what is wanted as nearly as in the plain map.
     assert adaptive.extra["found"] > 0.9
-    off = np.minimum(adaptive.specular, 1) - np.minimum(plain.specular, 1)
-    assert 0 < np.sqrt(np.mean(off**2)) < 0.1 * plain.specular.mean()
+    assert adaptive.extra["energy"] < 1.3 * plain.extra["energy"]
+    one, other = (np.minimum(found.specular, 1) for found in (plain, adaptive))
+    assert (one != other).any()
+    np.testing.assert_allclose(other.mean(), one.mean(), rtol=0.05)
 
 
 def test_without_gloss_the_image_is_the_diffuse_one(tmp_path):
@@ -152,9 +158,9 @@ def test_two_steps_make_the_roughness_of_one(tmp_path):
     scene = saved(mirror_floor(0.4), tmp_path)
     where = site(scene, tmp_path)
     size = (64, 48)
-    truth = render_frame(scene, CAMERA, resolution=size, spp=1024, channels=["radiance"]).arrays
+    truth = render_frame(scene, CAMERA, resolution=size, spp=256, channels=["radiance"]).arrays
     expected = np.minimum(truth["direct_specular"] + truth["indirect_specular"], 1)
-    knobs = {"probe_spp": 64, "parameterization": "plain"}
+    knobs = {"probe_spp": 16, "parameterization": "plain"}
     implementation = prepared(GPR, where, **knobs)
 
     def error(**given):
