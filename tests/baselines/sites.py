@@ -60,7 +60,7 @@ def emitted(axis: int, side: int) -> tuple[float, float, float]:
 
 def where_rays_leave(origins: Any, directions: Any, half: float = 1.0) -> tuple[Any, Any]:
     """Points (N, 3) where rays from inside leave the cube around the origin, and the face, as axis and side (N, 2)."""
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):
         distance = (half * np.sign(directions) - origins) / directions
     distance[~np.isfinite(distance)] = np.inf
     axis = distance.argmin(axis=1)
