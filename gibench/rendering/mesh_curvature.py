@@ -66,10 +66,8 @@ def corner_tensors(
     where = np.concatenate([np.arange(len(face)), corner])
     turned = _turned(tensor[np.concatenate([face, other])], normal[np.concatenate([face, other])], at[where])
     total = np.bincount(where, weight, len(face))
-    result = np.stack(
-        [np.bincount(where, weight * turned[:, i, j], len(face)) for i, j in COMPONENTS], axis=-1
-    )
-    result = result / np.where(total > 0, total, 1)[:, None]
+    sums = [np.bincount(where, weight * turned[:, i, j], len(face)) for i, j in COMPONENTS]
+    result = np.stack(sums, axis=-1) / np.where(total > 0, total, 1)[:, None]
     mean = 0.5 * result[:, :3].sum(axis=1)
     result += mean[:, None] * np.stack([at[:, i] * at[:, j] for i, j in COMPONENTS], axis=-1)
     return np.where(np.isfinite(result), result, 0).reshape(-1, 3, 6)
