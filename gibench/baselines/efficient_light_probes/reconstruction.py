@@ -15,7 +15,7 @@ from torch import Tensor
 from gibench.baselines.efficient_light_probes import METHOD
 from gibench.baselines.efficient_light_probes.examples import Example, examples
 from gibench.baselines.efficient_light_probes.implementation import ReflectionSearch
-from gibench.baselines.efficient_light_probes.temporal import DECAY, accumulated
+from gibench.baselines.efficient_light_probes.temporal import DECAY, accumulated, reprojected
 from gibench.baselines.efficient_light_probes.training import Plan, trained_network
 from gibench.baselines.first_hits import hits_of_rays
 from gibench.baselines.method import Prediction, Setting, Site, View
@@ -38,21 +38,11 @@ def _guides(scene, _lightmap, camera, preliminary, mirrored, glossy, width: int,
     return depth, albedo, reflected
 
 
-def _nothing(like: Any) -> Any:
-    """A frame of the same shape, with arrays of its own, that shows no surface."""
-    if isinstance(like, dict):
-        return {name: _nothing(part) for name, part in like.items()}
-    if isinstance(like, (list, tuple)):
-        return type(like)(_nothing(part) for part in like)
-    empty = dr.zeros(type(like), dr.width(like))
-    dr.make_opaque(empty)
-    return empty
-
-
 def as_image(values: Any, resolution: tuple[int, int], grid: int) -> Tensor:
     """Lanes of a grid (width, height) as (C, H, W) float32 on their device, each pixel the mean of grid × grid."""
     width, height = resolution
     parts = list(values) if isinstance(values, (mi.Color3f, mi.Vector3f)) else [values]
+    # A constant has one lane.
     lanes = torch.stack([part.torch().expand(width * height) for part in parts])
     return lanes.reshape(-1, height // grid, grid, width // grid, grid).mean(dim=(2, 4))
 
@@ -70,7 +60,7 @@ class Reconstruction(ReflectionSearch):
     def prepare(self, site: Site) -> None:
         """Bake the lightmap and the probes, train the network, or find them."""
         super().prepare(site)
-        self.kernels["temporal"] = Replay(site.scene, accumulated)
+        self.kernels["temporal"] = Replay(site.scene, reprojected)
         plan = Plan.of(self.settings, site.seed)
 
         def made() -> list[Example]:
@@ -113,11 +103,10 @@ class Reconstruction(ReflectionSearch):
         dr.eval(color)
         frame = {name: surfaces[name] for name in ("position", "normal", "material")}
         frame |= {"color": color, "camera": camera}
-        # A path that begins has a past without surfaces. Arrays of its own, so that the kernel stays the same.
-        past = [*self._past, *(_nothing(frame) for _ in DECAY)][: len(DECAY)]
+        sides = [dr.opaque(mi.Int32, side) for side in fine]
+        color = accumulated(color, [self.kernels["temporal"](frame, past, *sides) for past in self._past])
         self._past = [frame, *self._past][: len(DECAY)]
-        weighted = [(one, dr.opaque(mi.Float, weight)) for one, weight in zip(past, DECAY, strict=True)]
-        return self.kernels["temporal"](frame, weighted, *(dr.opaque(mi.Int32, side) for side in fine))
+        return color
 
     def render(self, view: View, stages: Stages) -> Prediction:
         """Search, add the frames before, and let the network mend it."""

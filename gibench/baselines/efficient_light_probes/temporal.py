@@ -7,7 +7,7 @@ lies on its own material and in its tangent plane: all else was hidden then.
 # mypy: disable-error-code="no-untyped-def, misc"
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from typing import Any
 
 import drjit as dr
@@ -52,19 +52,21 @@ def reprojected(now: dict[str, Any], past: dict[str, Any], width, height) -> tup
         weight = dr.select(same, weight, 0)
         color += weight * dr.gather(mi.Color3f, past["color"], lane, same)
         total += weight
-    return color * dr.select(total > 0, dr.rcp(total), 0), total
+    color *= dr.select(total > 0, dr.rcp(total), 0)
+    dr.eval(color, total)
+    return color, total
 
 
-def accumulated(now: dict[str, Any], past: Sequence[tuple[dict[str, Any], Any]], width, height):
-    """The weighted mean of this frame and earlier ones, mi.Color3f.
+def accumulated(color: Any, past: Iterable[tuple[Any, Any]]) -> Any:
+    """The weighted mean of a frame's radiance and earlier frames', mi.Color3f.
 
-    past: frames as for `reprojected`, each with its weight (mi.Float of one lane).
+    past: what `reprojected` gives for the frame before and the one before that, as far as there are any.
     """
-    color, total = mi.Color3f(now["color"]), mi.Float(1)
-    for frame, weight in past:
-        value, share = reprojected(now, frame, width, height)
-        color += weight * share * value
+    total = mi.Float(1)
+    mean = mi.Color3f(color)
+    for (value, share), weight in zip(past, DECAY, strict=False):
+        mean += weight * share * value
         total += weight * share
-    color /= total
-    dr.eval(color)
-    return color
+    mean /= total
+    dr.eval(mean)
+    return mean
