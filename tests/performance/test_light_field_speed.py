@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 
-import mitsuba as mi
 import numpy as np
 import pytest
 
@@ -22,6 +21,7 @@ REPEATS = 5
 def test_marching_with_against_without_the_coarse_pass(tmp_path):
     select_variant("auto")
     import drjit as dr
+    import mitsuba as mi
 
     from gibench.baselines.light_field_probes.marching import LightField
     from gibench.baselines.probes.baking import ProbeSettings
