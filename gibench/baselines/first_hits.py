@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gibench.rendering.camera import PinholeCamera, RayGenerator
+from gibench.rendering.integrator import NOT_DIFFUSE
 from gibench.rendering.scene import Scene
 
 
@@ -32,6 +33,11 @@ class FirstHits:
     bsdf: Any
     active: Any
     emission: Any
+
+    @property
+    def glossy(self) -> Any:
+        """mi.Bool, whether something was hit that reflects other than diffusely."""
+        return self.active & ((self.bsdf.flags() & NOT_DIFFUSE) != 0)
 
     @property
     def normal(self) -> Any:

@@ -92,7 +92,11 @@ def check_resolution(resolution: tuple[int, int]) -> tuple[int, int]:
 
 
 class RayGenerator:
-    """Rays of a camera, with its numbers kept out of the compiled kernel, so that one kernel serves all frames."""
+    """Rays of a camera, with its numbers kept out of the compiled kernel, so that one kernel serves all frames.
+
+    origin: mi.Point3f, m. axes: unit mi.Vector3f, as `PinholeCamera.frame`. scale: mi.Float, size of a pixel over its
+    depth. centre: mi.Vector2f of the film, pixels.
+    """
 
     def __init__(self, camera: PinholeCamera, resolution: tuple[int, int]) -> None:
         """Under the current variant."""
@@ -101,23 +105,36 @@ class RayGenerator:
 
         width, height = check_resolution(resolution)
         focal = camera.focal_length(width)
-        self._origin = mi.Point3f(list(camera.position))
-        self._axes = [mi.Vector3f(row.tolist()) for row in camera.frame]
-        self._scale = mi.Float(1 / focal)
-        self._centre = mi.Vector2f(0.5 * width, 0.5 * height)
+        self.origin = mi.Point3f(list(camera.position))
+        self.axes = [mi.Vector3f(row.tolist()) for row in camera.frame]
+        self.scale = mi.Float(1 / focal)
+        self.centre = mi.Vector2f(0.5 * width, 0.5 * height)
         if not is_scalar():
-            dr.make_opaque(self._origin, self._axes, self._scale, self._centre)
+            dr.make_opaque(self.origin, self.axes, self.scale, self.centre)
 
     @property
     def forward(self) -> Any:
         """Unit vector along the optical axis."""
-        return self._axes[2]
+        return self.axes[2]
+
+    def project(self, points: Any) -> tuple[Any, Any]:
+        """Film positions (mi.Point2f, as `rays` takes them) and depth (mi.Float, m) of world points (mi.Point3f).
+
+        Where the depth is not positive, the position means nothing.
+        """
+        import drjit as dr
+        import mitsuba as mi
+
+        offset = points - self.origin
+        right, down, depth = (dr.dot(axis, offset) for axis in self.axes)
+        inverse = dr.rcp(dr.select(depth > 0, depth, 1) * self.scale)
+        return mi.Point2f(right, down) * inverse + self.centre, depth
 
     def rays(self, pixel: Any) -> Any:
         """Rays through film positions `pixel` (mi.Point2f, pixels; (0, 0) is the outer corner of the first pixel)."""
         import drjit as dr
         import mitsuba as mi
 
-        offset = (pixel - self._centre) * self._scale
-        right, down, forward = self._axes
-        return mi.Ray3f(self._origin, dr.normalize(offset.x * right + offset.y * down + forward))
+        offset = (pixel - self.centre) * self.scale
+        right, down, forward = self.axes
+        return mi.Ray3f(self.origin, dr.normalize(offset.x * right + offset.y * down + forward))

@@ -16,10 +16,9 @@ from gibench.baselines.lightmap.deferred import OnLightmap
 from gibench.baselines.method import Prediction, Site, View
 from gibench.baselines.probes.baking import ProbeSettings
 from gibench.baselines.probes.maps import Probes, load_probes
+from gibench.baselines.probes.reflections import mirrored_by, surfaces_of
 from gibench.baselines.replay import Replay, camera_arrays, ray_generator
 from gibench.baselines.stages import Stages
-from gibench.rendering.gbuffer import mirror_direction
-from gibench.rendering.integrator import NOT_DIFFUSE
 
 MAPS = ("radiance", "material_id", "reflected_position", "reflected_material_id")
 
@@ -28,12 +27,7 @@ def _gbuffer(scene, lightmap, camera, width: int, height: int):
     """What was hit, the light it sends out but for glossy light, and what a search walks over."""
     hits = hits_of_rays(scene, ray_generator(camera), (width, height))
     seen = hits.emission + lightmap.diffuse(hits.si, hits.preliminary, hits.active)
-    surfaces = {
-        "glossy": hits.active & ((hits.bsdf.flags() & NOT_DIFFUSE) != 0),
-        "position": dr.select(hits.active, mi.Point3f(hits.si.p), 0),
-        "normal": hits.normal,
-        "material": scene.material_ids(hits.bsdf, hits.active),
-    }
+    surfaces = surfaces_of(scene, hits)
     dr.eval(hits.preliminary, seen, surfaces)
     return hits.preliminary, seen, surfaces
 
@@ -44,17 +38,15 @@ def _mirrored(scene, _lightmap, camera, preliminary, glossy, width: int, height:
     And the mi.PreliminaryIntersection3f of it.
     """
     hits = hits_of_rays(scene, ray_generator(camera), (width, height), preliminary)
-    ray = hits.si.spawn_ray(mirror_direction(hits.si, hits.ray.d))
-    found = scene.mi_scene.ray_intersect_preliminary(ray, coherent=False, active=glossy)
-    far = ~found.is_valid()
-    target = dr.select(far, mi.Point3f(ray.d), ray(dr.select(far, 0, found.t)))
-    dr.eval(target, far, found)
-    return target, far, found
+    mirrored = mirrored_by(scene, hits, glossy)
+    result = mirrored.target, mirrored.far, mirrored.found
+    dr.eval(result)
+    return result
 
 
 def _searched(probes: Probes, camera, surfaces, target, far, size, count: int, steps, tolerance):
     """Glossy light at each camera ray, and the steps of its searches. count: of probes that are searched."""
-    candidates = dr.concat(probes.nearest(camera["_origin"], count))
+    candidates = dr.concat(probes.nearest(camera["origin"], count))
     dr.eval(candidates)  # found once a frame, not once a point
     screen = Screen(surfaces["position"], surfaces["normal"], surfaces["material"], camera, *size)
     glossy = surfaces["glossy"]

@@ -32,8 +32,6 @@ STEEPNESS = 14.0
 BRIGHTEST = 40.0
 """Compressed value that outputs are held below: its radiance, 10¹⁶ times white, fits single precision."""
 
-FUSIONS = ("modulation", "concatenation")
-
 
 @dataclass(frozen=True)
 class Scale:
@@ -92,13 +90,17 @@ def _down(inputs: int, channels: tuple[int, ...]) -> nn.ModuleList:
     )
 
 
+FUSIONS = {"modulation": Modulation, "concatenation": Concatenation}
+"""How features of the G-buffers act on those of the image, by name of the method's knob."""
+
+
 class ReconstructionNetwork(nn.Module):
     """See the module."""
 
     def __init__(self, fusion: str = "modulation", channels: tuple[int, ...] = CHANNELS) -> None:
         """fusion: one of FUSIONS. channels: of the levels."""
         super().__init__()
-        kind = {"modulation": Modulation, "concatenation": Concatenation}[fusion]
+        kind = FUSIONS[fusion]
         self.image, self.guides = _down(3, channels), _down(GUIDES, channels)
         self.fusions = nn.ModuleList(kind(count) for count in channels)
         # Below the deepest level there is no skip: what comes up from it is alone.

@@ -28,8 +28,9 @@ from gibench.rendering.gbuffer import mirror_direction
 
 def _guides(scene, _lightmap, camera, preliminary, mirrored, glossy, width: int, height: int):
     """Depth (m, along the optical axis) and albedo of the first hits, albedo of what the glossy ones mirror."""
-    hits = hits_of_rays(scene, ray_generator(camera), (width, height), preliminary)
-    depth = dr.select(hits.active, hits.si.t * dr.dot(hits.ray.d, camera["_axes"][2]), 0)
+    generator = ray_generator(camera)
+    hits = hits_of_rays(scene, generator, (width, height), preliminary)
+    depth = dr.select(hits.active, hits.si.t * dr.dot(hits.ray.d, generator.forward), 0)
     albedo = surface.albedo(scene, hits.bsdf, hits.si, hits.active)
     ray = hits.si.spawn_ray(mirror_direction(hits.si, hits.ray.d))
     there = mirrored.compute_surface_interaction(ray, mi.RayFlags.All, glossy)

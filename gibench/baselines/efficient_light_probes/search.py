@@ -15,6 +15,7 @@ import drjit as dr
 import mitsuba as mi
 
 from gibench.baselines.probes.maps import Probes
+from gibench.baselines.replay import ray_generator
 
 CONFIDENT = 0.999
 """Confidence at which a search ends, T_max (section 5)."""
@@ -62,13 +63,10 @@ class Screen:
         The position lies where the camera ray through the point meets the tangent plane of the pixel that it falls
         into: on a plane it is the point itself, not the centre of a pixel.
         """
-        origin, axes = self.camera["_origin"], self.camera["_axes"]
-        offset = point - origin
-        right, down, depth = (dr.dot(axis, offset) for axis in axes)
-        active = active & (depth > 0)
-        inverse = dr.rcp(dr.select(active, depth, 1) * self.camera["_scale"])
-        at = mi.Point2f(right, down) * inverse + self.camera["_centre"]
-        inside = active & (at.x >= 0) & (at.y >= 0) & (at.x < self.width) & (at.y < self.height)
+        camera = ray_generator(self.camera)
+        origin, offset = camera.origin, point - camera.origin
+        at, depth = camera.project(point)
+        inside = active & (depth > 0) & (at.x >= 0) & (at.y >= 0) & (at.x < self.width) & (at.y < self.height)
         column, row = mi.Int32(dr.select(inside, at.x, 0)), mi.Int32(dr.select(inside, at.y, 0))
         lane = mi.UInt32(row * self.width + column)
         position = dr.gather(mi.Point3f, self.position, lane, inside)
@@ -79,7 +77,7 @@ class Screen:
         on_plane = origin + along * offset
         # Seen from the side, the plane leaves the pixel's own surface far behind.
         cosine = dr.maximum(dr.abs(slope) / dr.maximum(dr.norm(offset), 1e-20), EDGE_ON)
-        pixel = depth * self.camera["_scale"] / cosine
+        pixel = depth * camera.scale / cosine
         near = (slope != 0) & (dr.norm(on_plane - position) <= 2 * pixel)
         return dr.select(near, on_plane, position), normal, material, inside
 

@@ -13,6 +13,8 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
+from gibench.baselines.replay import ray_generator
+
 DECAY = (0.3, 0.1)
 """Weights of the frame before and of the one before that, beside 1 for the present one (section 4.4)."""
 
@@ -27,19 +29,15 @@ def reprojected(now: dict[str, Any], past: dict[str, Any], width, height) -> tup
     `replay.camera_arrays`. width, height: mi.Int32 of one lane. Mixed from the four nearest rays of the earlier frame;
     the share (mi.Float in [0, 1]) is the weight of those that met the same surface.
     """
-    camera = past["camera"]
-    axes, origin = camera["_axes"], camera["_origin"]
+    camera = ray_generator(past["camera"])
     point, normal = mi.Point3f(now["position"]), mi.Vector3f(now["normal"])
-    offset = point - origin
-    depth = dr.dot(axes[2], offset)
+    at, depth = camera.project(point)
     ahead = (now["material"] != 0) & (depth > 0)
-    inverse = dr.rcp(dr.select(ahead, depth, 1) * camera["_scale"])
-    at = mi.Point2f(dr.dot(axes[0], offset), dr.dot(axes[1], offset)) * inverse + camera["_centre"]
     ahead &= (at.x >= 0) & (at.y >= 0) & (at.x <= width) & (at.y <= height)
     at = dr.select(ahead, at - 0.5, 0)
     low = dr.floor(at)
     share = at - low
-    reach = OFF_PLANE * dr.norm(offset)
+    reach = OFF_PLANE * dr.norm(point - camera.origin)
     color, total = mi.Color3f(0), mi.Float(0)
     for i, j in ((0, 0), (1, 0), (0, 1), (1, 1)):
         column, row = mi.Int32(low.x) + i, mi.Int32(low.y) + j

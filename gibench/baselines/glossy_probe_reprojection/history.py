@@ -13,6 +13,8 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
+from gibench.baselines.replay import ray_generator
+
 APART = 4.0
 """Sizes of a pixel by which the point that the earlier camera saw may lie aside of the one that is looked for."""
 
@@ -39,16 +41,14 @@ def recalled(frame: Frame, point: Any, material: Any, active: Any) -> tuple[Any,
 
     point: mi.Point3f, m. material: mi.UInt32, of their surfaces.
     """
-    offset = point - frame.camera["_origin"]
-    right, down, depth = (dr.dot(axis, offset) for axis in frame.camera["_axes"])
+    camera = ray_generator(frame.camera)
+    at, depth = camera.project(point)
     active = active & (depth > 0)
-    pixel = depth * frame.camera["_scale"]
-    at = mi.Point2f(right, down) / dr.select(active, pixel, 1) + frame.camera["_centre"]
     active &= (at.x >= 0) & (at.y >= 0) & (at.x < frame.width) & (at.y < frame.height)
     column, row = mi.Int32(dr.select(active, at.x, 0)), mi.Int32(dr.select(active, at.y, 0))
     lane = mi.UInt32(row * frame.width + column)
     seen = active & dr.gather(mi.Bool, frame.known, lane, active)
     seen &= dr.gather(mi.UInt32, frame.material, lane, active) == material
     there = dr.gather(mi.Point3f, frame.position, lane, active)
-    seen &= dr.norm(there - point) <= APART * pixel
+    seen &= dr.norm(there - point) <= APART * depth * camera.scale
     return dr.gather(mi.Color3f, frame.color, lane, seen), seen

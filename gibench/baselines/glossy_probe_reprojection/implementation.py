@@ -30,12 +30,11 @@ from gibench.baselines.lightmap.deferred import OnLightmap
 from gibench.baselines.method import Prediction, Setting, Site, View
 from gibench.baselines.probes.baking import POSITIONS, ProbeSettings
 from gibench.baselines.probes.maps import load_probes
+from gibench.baselines.probes.reflections import mirrored_by, surfaces_of
 from gibench.baselines.replay import Replay, camera_arrays, ray_generator
 from gibench.baselines.stages import Stages
 from gibench.rendering import surface
 from gibench.rendering.curvature import FLAGS
-from gibench.rendering.gbuffer import mirror_direction
-from gibench.rendering.integrator import NOT_DIFFUSE
 
 LEAST_ENERGY = 0.01
 """Energy below which samples are all as good: equation 4 divides by it."""
@@ -51,11 +50,7 @@ def _gbuffer(scene, lightmap, camera, width: int, height: int):
     """What was hit, the light it sends out but for glossy light, and what search and filter know of it."""
     hits = hits_of_rays(scene, ray_generator(camera), (width, height))
     seen = hits.emission + lightmap.diffuse(hits.si, hits.preliminary, hits.active)
-    surfaces = {
-        "glossy": hits.active & ((hits.bsdf.flags() & NOT_DIFFUSE) != 0),
-        "position": dr.select(hits.active, mi.Point3f(hits.si.p), 0),
-        "normal": dr.select(hits.active, mi.Vector3f(dr.mulsign(hits.si.sh_frame.n, hits.si.wi.z)), 0),
-        "material": scene.material_ids(hits.bsdf, hits.active),
+    surfaces = surfaces_of(scene, hits) | {
         "roughness": surface.roughness(scene, hits.bsdf, hits.si, hits.active),
         "distance": dr.select(hits.active, hits.si.t, 0),
     }
@@ -79,15 +74,14 @@ def _mirrored(scene, _lightmap, camera, preliminary, glossy, width: int, height:
     The place is a direction where that is infinitely far; the material is 0 there.
     """
     hits = hits_of_rays(scene, ray_generator(camera), (width, height), preliminary)
-    ray = hits.si.spawn_ray(mirror_direction(hits.si, hits.ray.d))
-    found = scene.mi_scene.ray_intersect_preliminary(ray, coherent=False, active=glossy)
-    far = ~found.is_valid()
-    hit = found.compute_surface_interaction(ray, mi.RayFlags.Minimal, glossy & ~far)
+    one = mirrored_by(scene, hits, glossy)
+    there = glossy & ~one.far
+    hit = one.found.compute_surface_interaction(one.ray, mi.RayFlags.Minimal, there)
     mirrored = {
-        "far": far,
-        "target": dr.select(far, mi.Point3f(ray.d), ray(dr.select(far, 0, found.t))),
-        "material": scene.material_ids(hit.bsdf(), glossy & ~far),
-        "reach": dr.select(far, dr.inf, found.t),
+        "far": one.far,
+        "target": one.target,
+        "material": scene.material_ids(hit.bsdf(), there),
+        "reach": dr.select(one.far, dr.inf, one.found.t),
     }
     dr.eval(mirrored)
     return mirrored
@@ -124,14 +118,14 @@ def _filtered(footprint, camera, surfaces, mirrored, color, energy, size, unit, 
     share = dr.select(mirrored["far"], 1, reach / dr.maximum(reach + distance, 1e-20))
     roughness = surfaces["roughness"]
     own, baked = (footprint.deviation(factor * roughness, share) for factor in (1.0, reduced))
-    towards = (surfaces["position"] - camera["_origin"]) / dr.maximum(distance, 1e-20)
+    towards = (surfaces["position"] - camera["origin"]) / dr.maximum(distance, 1e-20)
     cosine = dr.abs(dr.dot(towards, surfaces["normal"]))
-    across, down, ahead = (dr.dot(axis, surfaces["normal"]) for axis in camera["_axes"])
-    right, below, forward = (dr.dot(axis, towards) for axis in camera["_axes"])
+    across, down, ahead = (dr.dot(axis, surfaces["normal"]) for axis in camera["axes"])
+    right, below, forward = (dr.dot(axis, towards) for axis in camera["axes"])
     slant = mi.Vector2f(across - ahead * right / forward, down - ahead * below / forward)
     length = dr.norm(slant)
     slant = dr.select(length > 1e-4, slant / dr.maximum(length, 1e-4), mi.Vector2f(1, 0))
-    scale = dr.sqrt(blur) / camera["_scale"]
+    scale = dr.sqrt(blur) / camera["scale"]
     covariance = slanted(dr.square(own * scale), slant, 1, dr.square(cosine)) - slanted(
         dr.square(baked * scale), slant, 1, dr.square(cosine)
     )
@@ -189,7 +183,7 @@ class GlossyProbeReprojection(OnLightmap):
                 mi.UInt32(chosen),
                 mi.Float(shares),
                 dr.opaque(mi.UInt32, number),
-                camera["_origin"],
+                camera["origin"],
                 surfaces,
                 mirrored,
                 [

@@ -16,9 +16,6 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-ORDERS = (0, 1, 2)
-"""No motion at all, Jacobian, Jacobian and Hessian."""
-
 FOCUS = 0.02
 """Smallest determinant of the 2 × 2 system, as a share of what it is on a plane: at the focus of a concave mirror it
 is 0, and a point moves infinitely far."""
@@ -70,9 +67,9 @@ def displacement(mirror: Mirror, eye: Any, target: Any, far: Any, move: Any, ord
     """How far the mirror point of `target` moves as the eye does, mi.Vector3f, m.
 
     eye: mi.Point3f, p. target: what is mirrored, mi.Point3f, or its unit direction where that is infinitely far (`far`,
-    mi.Bool). move: mi.Vector3f, of the eye, Δp. order: mi.UInt32, one of ORDERS. The error is O(|Δp|^(order + 1)). The
-    result is finite: no longer than the paths to eye and target and the move together, its second order no longer than
-    its first.
+    mi.Bool). move: mi.Vector3f, of the eye, Δp. order: mi.UInt32, 0 (no motion at all), 1 (Jacobian) or 2 (Jacobian and
+    Hessian). The error is O(|Δp|^(order + 1)). The result is finite: no longer than the paths to eye and target and the
+    move together, its second order no longer than its first.
     """
     n = mirror.normal
     to_point = mirror.point - eye

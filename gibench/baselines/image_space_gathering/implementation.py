@@ -11,7 +11,7 @@ import mitsuba as mi
 from gibench.baselines.first_hits import averaged, hits_of_rays
 from gibench.baselines.image_space_gathering.gathering import gather
 from gibench.baselines.image_space_gathering.pyramid import Layout, MirrorImage, Pyramid
-from gibench.baselines.image_space_gathering.reflectance import directional_albedo, specular_context
+from gibench.baselines.image_space_gathering.reflectance import directional_albedo
 from gibench.baselines.lightmap.deferred import OnLightmap
 from gibench.baselines.method import Prediction, View
 from gibench.baselines.replay import camera_arrays, ray_generator
@@ -23,7 +23,7 @@ def _gbuffer(scene, lightmap, camera, width: int, height: int):
     """What was hit, what it sends out but for glossy light, and what the gather must know of it."""
     hits = hits_of_rays(scene, ray_generator(camera), (width, height))
     seen = hits.emission + lightmap.diffuse(hits.si, hits.preliminary, hits.active)
-    glossy = hits.active & ((hits.bsdf.flags() & specular_context().type_mask) != 0)
+    glossy = hits.glossy
     surfaces = {
         "glossy": glossy,
         "reflectance": directional_albedo(hits.si, hits.bsdf, glossy),

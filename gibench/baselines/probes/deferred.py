@@ -19,7 +19,6 @@ from gibench.baselines.probes.baking import ProbeSettings
 from gibench.baselines.probes.maps import Probes, load_probes
 from gibench.baselines.replay import Replay, arrays_of, camera_arrays, ray_generator
 from gibench.baselines.stages import Stages
-from gibench.rendering.integrator import NOT_DIFFUSE
 from gibench.rendering.scene import Scene
 
 
@@ -29,9 +28,8 @@ def surfaces_seen(scene: Scene, lightmap: Lightmap, camera, width: int, height: 
     camera: from `camera_arrays`. Returns mi.Point3f, mi.Bool and mi.Color3f.
     """
     hits = hits_of_rays(scene, ray_generator(camera), (width, height))
-    glossy = hits.active & ((hits.bsdf.flags() & NOT_DIFFUSE) != 0)
     matte = hits.emission + lightmap.diffuse(hits.si, hits.preliminary, hits.active)
-    found = hits.si.p, glossy, mi.Color3f(matte)
+    found = hits.si.p, hits.glossy, mi.Color3f(matte)
     dr.eval(found)
     return found
 

@@ -90,7 +90,7 @@ def found(surface, probe, targets, steps=20, far=False):
 
 def mirrored_by(surface, towards):
     """Points (N, 3) that the pixels reflect, `towards` m along the mirror ray of each."""
-    origin = np.array(surface.camera["_origin"]).ravel()
+    origin = np.array(surface.camera["origin"]).ravel()
     points, normals = columns(surface.position).astype(np.float64), columns(surface.normal).astype(np.float64)
     incoming = points - origin
     incoming /= np.linalg.norm(incoming, axis=1, keepdims=True)
@@ -281,7 +281,7 @@ def floor_probes(folder, positions, colors, hidden=()):
 
 
 def blend(probes, surface, number):
-    origin = np.array(surface.camera["_origin"]).ravel()
+    origin = np.array(surface.camera["origin"]).ravel()
     points = columns(surface.position).astype(np.float64)
     out = (points - origin) * [1, 1, -1]
     ceiling = points + out * (3.0 / out[:, 2])[:, None]

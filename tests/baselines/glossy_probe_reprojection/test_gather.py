@@ -19,7 +19,7 @@ from gibench.baselines.glossy_probe_reprojection.gather import (
 )
 from gibench.baselines.glossy_probe_reprojection.perturbation import Mirror
 from gibench.rendering.camera import PinholeCamera
-from tests.baselines.efficient_light_probes.test_search import floor, rays
+from tests.baselines.efficient_light_probes.test_search import floor, rays, vectors
 from tests.baselines.probes.test_mappings import columns
 from tests.baselines.probes.test_maps import written
 
@@ -27,10 +27,6 @@ SIZE = (24, 18)
 ABOVE = PinholeCamera((0.3, -2.0, 2.5), (0.0, 0.2, 0.0), 1.0)
 CEILING = 4.0
 PAINT, FLOOR, OTHER = 2, 1, 3
-
-
-def vectors(kind, values):
-    return kind(np.ascontiguousarray(np.asarray(values, dtype=np.float32).T))
 
 
 def under_a_ceiling(points, directions):
