@@ -20,6 +20,7 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from gibench.errors import GibenchError
 
@@ -208,6 +209,19 @@ def is_scalar() -> bool:
     import mitsuba as mi
 
     return str(mi.variant()).startswith("scalar")
+
+
+def registry_key(kind: str, plugin: Any) -> int:
+    """What identifies a plugin inside a kernel: its registry index, or the object itself in scalar mode.
+
+    kind: name of its pointer type in Mitsuba, such as "BSDFPtr".
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    if is_scalar():
+        return id(plugin)
+    return int(dr.reinterpret_array(mi.UInt32, getattr(mi, kind)(plugin))[0])
 
 
 def limit_threads(count: int) -> None:

@@ -14,7 +14,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from gibench.rendering.backend import is_scalar
+from gibench.rendering.backend import is_scalar, registry_key
 from gibench.rendering.mesh_curvature import corner_tensors
 
 FLAGS = mi.RayFlags.All | mi.RayFlags.dNSdUV
@@ -40,7 +40,7 @@ class Curvature:
             if not shape.is_mesh():
                 self._all_meshes = False
                 continue
-            self._first[_key(shape)] = count
+            self._first[registry_key("ShapePtr", shape)] = count
             tables.append(_table(shape))
             count += len(tables[-1])
         self._table = np.concatenate([*tables, np.zeros((1, 3, 6))]).astype(np.float32).reshape(-1, 2, 3)
@@ -85,7 +85,7 @@ class Curvature:
     def _on_meshes(self, si, preliminary, s, t, active):
         """The second fundamental form along s, s; t, t and s, t, and whether the hit is on a mesh."""
         if is_scalar():
-            first = self._first.get(_key(si.shape), NONE) if active else NONE
+            first = self._first.get(registry_key("ShapePtr", si.shape), NONE) if active else NONE
             meshed = first != NONE
         else:
             shape = dr.reinterpret_array(mi.UInt32, si.shape)
@@ -109,11 +109,6 @@ class Curvature:
         if is_scalar():
             return mi.Vector3f(self._table[int(row), half].tolist())
         return dr.gather(mi.Vector3f, self.arrays[0], 2 * row + half, active)
-
-
-def _key(shape: Any) -> int:
-    """What identifies a shape inside a kernel: its registry index, or the object itself in scalar mode."""
-    return id(shape) if is_scalar() else int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))[0])
 
 
 def _table(mesh: Any) -> NDArray[np.float64]:

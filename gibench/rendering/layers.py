@@ -14,7 +14,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from gibench.rendering.backend import is_scalar
+from gibench.rendering.backend import is_scalar, registry_key
 
 LEAF, SIDES, NESTED, MASK, BLEND = range(5)
 
@@ -54,11 +54,6 @@ class _Children(mi.TraversalCallback):
             self.found.append(value)
 
 
-def _key(bsdf: Any) -> int:
-    """What identifies a material inside a kernel: its registry index, or the object itself in scalar mode."""
-    return id(bsdf) if is_scalar() else int(dr.reinterpret_array(mi.UInt32, mi.BSDFPtr(bsdf))[0])
-
-
 class Layers:
     """The trees below the materials of a scene.
 
@@ -82,7 +77,7 @@ class Layers:
             return
         columns = np.zeros((3, max(self._nodes, default=0) + 1), dtype=np.uint32)
         for key, (kind, first, second) in self._nodes.items():
-            columns[:, key] = kind, _key(first), _key(second)
+            columns[:, key] = kind, registry_key("BSDFPtr", first), registry_key("BSDFPtr", second)
         etas = np.zeros(max(self._etas, default=0) + 1, dtype=np.float32)
         etas[list(self._etas)] = list(self._etas.values())
         self.arrays = [*(mi.UInt32(column) for column in columns), mi.Float(etas)]
@@ -98,17 +93,17 @@ class Layers:
             self.principled |= name in PRINCIPLED
             self.transmits |= bool(int(bsdf.flags()) & int(TRANSMITS))
             if name in PLAIN_ETA:
-                self._etas[_key(bsdf)] = float(mi.traverse(bsdf)["eta"])
+                self._etas[registry_key("BSDFPtr", bsdf)] = float(mi.traverse(bsdf)["eta"])
             return 0
         first, second = children[0], children[-1]
         depth = max(self._look(child) for child in (first, second))
         if name == "TwoSidedBRDF":
-            if _key(first) != _key(second):
+            if registry_key("BSDFPtr", first) != registry_key("BSDFPtr", second):
                 kind = SIDES
             elif depth == 0:
                 # Attributes reach through.
-                if _key(first) in self._etas:
-                    self._etas[_key(bsdf)] = self._etas[_key(first)]
+                if registry_key("BSDFPtr", first) in self._etas:
+                    self._etas[registry_key("BSDFPtr", bsdf)] = self._etas[registry_key("BSDFPtr", first)]
                 return 0
             else:
                 kind = NESTED
@@ -119,7 +114,7 @@ class Layers:
             self._blends = True
         else:
             kind = NESTED  # bump and normal maps
-        self._nodes[_key(bsdf)] = (kind, first, second)
+        self._nodes[registry_key("BSDFPtr", bsdf)] = (kind, first, second)
         return depth + 1
 
     def parts(self, bsdf: Any, si: Any, active: Any) -> tuple[list[Part], Any]:

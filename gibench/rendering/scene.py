@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gibench.errors import GibenchError
-from gibench.rendering.backend import is_scalar, select_variant, threads_to_load
+from gibench.rendering.backend import is_scalar, registry_key, select_variant, threads_to_load
 from gibench.rendering.kernel_sharing import spare_plugins
 
 OPENINGS = "openings.json"
@@ -98,16 +98,6 @@ class Scene:
         return dr.gather(mi.UInt32, self._tables[1], dr.reinterpret_array(mi.UInt32, shape), active)
 
 
-def _key(pointer_type: Any, thing: Any) -> int:
-    """What identifies a plugin inside a kernel: its registry index, or the object itself in scalar mode."""
-    import drjit as dr
-    import mitsuba as mi
-
-    if is_scalar():
-        return id(thing)
-    return int(dr.reinterpret_array(mi.UInt32, pointer_type(thing))[0])
-
-
 def _check(shape: Any) -> None:
     """Raise SceneError for a mesh without triangles, and for a lamp without area, which would shine in vain."""
     if shape.is_mesh() and shape.face_count() == 0:
@@ -125,7 +115,6 @@ def wrap(mi_scene: Any) -> Scene:
 
     Raises SceneError for a mesh without triangles or a light without area.
     """
-    import mitsuba as mi
 
     for shape in mi_scene.shapes():
         _check(shape)
@@ -135,11 +124,11 @@ def wrap(mi_scene: Any) -> Scene:
     shape_of: dict[int, int] = {}
     for number, shape in enumerate(sorted(mi_scene.shapes(), key=lambda s: s.id())):
         shapes.append(shape.id() or f"shape_{number}")
-        shape_of[_key(getattr(mi, "ShapePtr", None), shape)] = number + 1
+        shape_of[registry_key("ShapePtr", shape)] = number + 1
         bsdf = shape.bsdf()
         if bsdf is None:
             continue
-        key = _key(getattr(mi, "BSDFPtr", None), bsdf)
+        key = registry_key("BSDFPtr", bsdf)
         if key not in material_of:
             materials.append(bsdf.id() or f"material_{len(materials)}")
             material_of[key] = len(materials)
