@@ -24,7 +24,13 @@ DECAY = 100.0
 """Of a probe's weight with its lack of confidence, τ (section 5)."""
 
 SHORTER = 0.5
-"""Of a step that leads to another material, off the screen, or to a lower confidence. The paper gives no factor."""
+"""Of a step that leads to another material or to a lower confidence. The paper gives no factor."""
+
+WITHIN = 0.999
+"""Of the way to the border of the screen, for a step that would leave it."""
+
+SHORTEST = 0.5
+"""Sizes of a pixel below which a step that leads nowhere is not halved any more: the screen has nothing in between."""
 
 LONGER = 2.0
 """Of the step after one that has been taken, up to the whole."""
@@ -80,6 +86,29 @@ class Screen:
         pixel = depth * camera.scale / cosine
         near = (slope != 0) & (dr.norm(on_plane - position) <= 2 * pixel)
         return dr.select(near, on_plane, position), normal, material, inside
+
+    def share_within(self, point: Any, step: Any) -> Any:
+        """Share of a step (mi.Vector3f) from a point on the screen that stays on it, mi.Float in [0, 1]."""
+        camera = ray_generator(self.camera)
+        (right, down, depth), (move_right, move_down, move_depth) = (
+            [dr.dot(axis, vector) for axis in camera.axes] for vector in (point - camera.origin, step)
+        )
+        result = mi.Float(1)
+        # Distances to the four planes through the eye and the sides of the screen, and how fast they change.
+        for half, at, move in (
+            (0.5 * mi.Float(self.width) * camera.scale, right, move_right),
+            (0.5 * mi.Float(self.height) * camera.scale, down, move_down),
+        ):
+            for side in (-1.0, 1.0):
+                left, change = half * depth + side * at, half * move_depth + side * move
+                share = WITHIN * dr.maximum(left, 0) / dr.select(change < 0, -change, 1)
+                result = dr.select(change < 0, dr.minimum(result, share), result)
+        return result
+
+    def pixel(self, point: Any) -> Any:
+        """Size of a pixel at points, mi.Float, m."""
+        camera = ray_generator(self.camera)
+        return camera.scale * dr.norm(point - camera.origin)
 
 
 @dataclass
@@ -146,7 +175,9 @@ def search(
 
     while searching & (done < steps):
         mirrored, meets = mirror_point(probe, reflected, point, facing)
-        candidate = point + share * (mirrored - point)
+        step = share * (mirrored - point)
+        step *= screen.share_within(point, step)
+        candidate = point + step
         seen, seen_normal, seen_material, inside = screen.seen_at(candidate, meets)
         there = confidence(probe, reflected, seen, seen_normal)
         holds = inside & (seen_material == material) & (there > value)
@@ -157,6 +188,7 @@ def search(
         done += 1
         # Without a mirror image in the tangent plane there is nowhere to go.
         searching &= meets & (value < CONFIDENT)
+        searching &= holds | (dr.norm(step) > SHORTEST * screen.pixel(point))
 
     return point, value, done
 

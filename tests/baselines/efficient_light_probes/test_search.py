@@ -206,6 +206,32 @@ def test_points_stay_on_the_screen_and_on_the_material():
         np.testing.assert_array_less(value, 1.0001)
 
 
+def test_steps_end_at_the_border_of_the_screen():
+    """Against the projection of points along the step; those that stay on the screen are not shortened."""
+    surface = screen(ABOVE, floor)
+    start = columns(surface.position).astype(np.float64)
+    move = np.random.default_rng(5).normal(size=start.shape) * [3.0, 3.0, 1.0]
+    share = np.array(surface.share_within(surface.position, vectors(mi.Vector3f, move))).astype(np.float64)
+    along = np.linspace(0, 1, 2001)
+    points = start[:, None] + along[:, None] * move[:, None]
+    x, y, depth = ABOVE.project(points.reshape(-1, 3), SIZE)
+    inside = (depth > 0) & (x >= 0) & (x <= SIZE[0]) & (y >= 0) & (y <= SIZE[1])
+    inside = inside.reshape(points.shape[:2])
+    leaves = ~inside.all(axis=1)
+    assert leaves.mean() > 0.3
+    expected = along[np.argmin(inside, axis=1)]
+    np.testing.assert_allclose(share[leaves], expected[leaves], atol=2e-3)
+    np.testing.assert_array_equal(share[~leaves], 1)
+
+
+def test_a_search_that_cannot_go_on_ends_soon():
+    """Mirror points far beside the screen: at its border there is nothing left to halve."""
+    surface = screen(ABOVE, floor)
+    _, value, done, _ = found(surface, [5.0, 3.0, 0.5], mirrored_by(surface, 3.0))
+    assert (value < CONFIDENT).mean() > 0.9
+    assert done.mean() < 6
+
+
 def test_a_probe_behind_the_surface_finds_nothing():
     surface = screen(ABOVE, floor)
     point, value, _, _ = found(surface, [0.0, 0.0, -1.0], mirrored_by(surface, 1.0))
