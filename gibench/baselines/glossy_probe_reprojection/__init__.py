@@ -1,7 +1,7 @@
 """Glossy Probe Reprojection (Rodriguez et al. 2020): probes searched where a reflection should be, then filtered."""
 
 from gibench.baselines.lightmap.knobs import LIGHTMAP_KNOBS, RAYS
-from gibench.baselines.method import Knob, Method
+from gibench.baselines.method import Knob, Method, Variant
 from gibench.baselines.probes.knobs import PROBE_KNOBS
 
 METHOD = Method(
@@ -43,4 +43,13 @@ METHOD = Method(
         RAYS,
     ),
     budget="rays",
+    variants=(
+        Variant("plain", {"parameterization": "plain"}),
+        Variant("planar", {"paraboloid": False}),
+        Variant("small-window", {"window": 3}),
+        Variant("one-level", {"levels": 1}),
+        Variant("four-probes", {"used": 4}),
+        Variant("no-filter", {"filter": False}),
+        Variant("whole-roughness", {"halved": False, "filter": False}),
+    ),
 )
