@@ -13,7 +13,7 @@ SEARCH_KNOBS = (
     Knob(
         "tolerance",
         0.1,
-        (0.02, 0.05, 0.1, 0.2, 0.5, 1.0),
+        (0.001, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 10.0),
         "metres between what a probe reflects and what the pixel does, at most, D_max",
     ),
 )

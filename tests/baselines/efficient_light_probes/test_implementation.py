@@ -12,7 +12,8 @@ from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.render import render_frame
 from gibench.rendering.scene import load_dict
 from tests.baselines.meshes import diffuse, room, slab
-from tests.baselines.sites import RESOLUTION, site, view
+from tests.baselines.probes.test_narrowed import metal
+from tests.baselines.sites import RESOLUTION, lit_box, site, view
 from tests.rendering import scenes
 
 SMALL = {
@@ -30,13 +31,12 @@ CAMERA = PinholeCamera((0.7, 0.8, 0.3), (-0.4, -0.5, -0.8), 1.2)
 def mirror_floor(roughness):
     """A closed room with a coloured box on a floor of metal, all lit by a lamp."""
     lamp = scenes.rectangle([0.2, 0, 0.98], [0, 0, -1], (0.3, 0.3), emitter=scenes.area(8, 7, 6))
-    metal = {"type": "roughconductor", "material": "none", "distribution": "ggx", "alpha": roughness}
     return {
         "type": "scene",
         **room(diffuse(0.7, 0.6, 0.5)),
         "lamp": lamp,
         "box": slab([-0.7, -0.7, -1.001], [-0.2, -0.2, -0.3], diffuse(0.2, 0.5, 0.7)),
-        "floor": slab([-1.05, -1.05, -1.05], [1.05, 1.05, -0.999], metal),
+        "floor": slab([-1.05, -1.05, -1.05], [1.05, 1.05, -0.999], metal(roughness)),
     }
 
 
@@ -79,6 +79,22 @@ def test_without_gloss_the_image_is_the_diffuse_one(tmp_path):
     assert not found.specular.any()
     assert (found.color > 0).all()
     assert found.extra["search_steps"] == 0
+
+
+@pytest.mark.parametrize(("half", "tolerance"), [(100.0, 10.0), (0.01, 0.001)])
+def test_a_scene_of_another_size_gives_the_same_image(tmp_path, half, tolerance):
+    def image(half, tolerance, folder):
+        camera = PinholeCamera(
+            (0.5 * half, 0.6 * half, 0.3 * half), (-0.4 * half, -0.5 * half, -0.8 * half), 1.2
+        )
+        where = site(load_dict(lit_box(metal(0.1), half=half)), folder)
+        found, _ = rendered(SEARCH, where, camera, probe_width=128, probe_spp=4, tolerance=tolerance)
+        return found.specular
+
+    once, other = image(1.0, 0.1, tmp_path / "one"), image(half, tolerance, tmp_path / "other")
+    assert once.max() > 1
+    # The probes are sampled anew, where rounding may place one beside where it was.
+    assert np.sqrt(np.mean((once - other) ** 2)) < 0.05 * once.mean()
 
 
 def test_one_preparation_serves_all_settings_that_do_not_bake(tmp_path):
