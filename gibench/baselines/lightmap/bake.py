@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gibench.baselines.lightmap.coverage import cover
 from gibench.baselines.lightmap.denoising import denoise_lightmap
-from gibench.baselines.lightmap.filling import dilate, fill_charts, fill_everywhere
+from gibench.baselines.lightmap.filling import dilate, fill_charts
 from gibench.baselines.lightmap.lookup import Lightmap, read_lightmap, write_lightmap
 from gibench.baselines.lightmap.texel_paths import TexelPoints, hidden, trace_texels
 from gibench.baselines.lightmap.unwrapping import LightmapError, Unwrapping, unwrap
@@ -22,7 +22,7 @@ from gibench.rendering.backend import is_scalar
 from gibench.rendering.render import MAX_DEPTH
 from gibench.rendering.scene import Scene
 
-VERSION = 2
+VERSION = 3
 """Of what is baked; raise it when the texels change."""
 
 SEED = 0
@@ -80,7 +80,7 @@ def bake_atlas(
         atlas[coverage.texels], known[coverage.texels] = values, is_known
         atlas = fill_charts(atlas.reshape(height, width, 3), known.reshape(height, width, 3), charts)
         if denoise:
-            atlas = denoise_lightmap(fill_everywhere(atlas, charts))
+            atlas = denoise_lightmap(atlas, charts)
         atlas = dilate(atlas, charts)
     return BakedAtlas(unwrapping, atlas, charts, len(coverage.texels), clock.seconds)
 

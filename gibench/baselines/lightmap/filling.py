@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt
 
 
 def fill_charts(
@@ -52,14 +51,6 @@ def dilate(atlas: NDArray[np.float32], charts: NDArray[np.int32]) -> NDArray[np.
     ring = count > 0
     values[bare[ring]] = values[around[ring]].sum(axis=1, dtype=np.float64) / count[ring, None]
     return _unframed(values, charts.shape)
-
-
-def fill_everywhere(atlas: NDArray[np.float32], charts: NDArray[np.int32]) -> NDArray[np.float32]:
-    """Give all texels off the charts the value of the nearest on one, so that a filter meets no black rims."""
-    if not (charts >= 0).any():
-        return atlas
-    rows, columns = distance_transform_edt(charts < 0, return_distances=False, return_indices=True)
-    return np.ascontiguousarray(atlas[rows, columns])
 
 
 def _framed(image: NDArray[Any], outside: float) -> NDArray[Any]:
