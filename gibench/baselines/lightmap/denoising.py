@@ -24,33 +24,31 @@ def denoise_lightmap(atlas: NDArray[np.float32], charts: NDArray[np.int32]) -> N
     Raises DenoiserError where mitsuba-oidn is missing.
     """
     result = np.zeros_like(atlas)
-    if not atlas[charts >= 0].any():
+    pieces = []
+    for number, box in enumerate(find_objects(charts + 1)):
+        own = None if box is None else charts[box] == number
+        if own is not None and atlas[box][own].any():
+            pieces.append((box, own))
+    if not pieces:
         return result
     try:
         import mitsuba_oidn
     except ImportError as error:
         raise DenoiserError(f"the denoiser does not load ({error}); run: pip install mitsuba-oidn") from error
-    boxes = [
-        (number, box)
-        for number, box in enumerate(find_objects(charts + 1))
-        if box is not None and atlas[box][charts[box] == number].any()
-    ]
-    sides = np.array([[side.stop - side.start for side in box] for _, box in boxes])
+    sides = np.array([own.shape for _, own in pieces])
     corners, size = shelved(sides + 2 * MARGIN)
     # All charts equally bright: what is left of a neighbour beyond the margin does no harm.
     sheet = np.ones((*size, 3), dtype=np.float32)
-    levels = []
-    for (number, box), (row, column), (height, width) in zip(boxes, corners, sides + 2 * MARGIN, strict=True):
-        own = charts[box] == number
-        level = float(atlas[box][own].mean(dtype=np.float64))
-        levels.append(level)
+    levels = [float(atlas[box][own].mean(dtype=np.float64)) for box, own in pieces]
+    for (box, own), level, (row, column), (height, width) in zip(
+        pieces, levels, corners, sides + 2 * MARGIN, strict=True
+    ):
         sheet[row : row + height, column : column + width] = _surrounded(atlas[box], own) / level
     clean = mitsuba_oidn.denoise(sheet, hdr=True, filter="RTLightmap", input_scale=input_scale(sheet))
     clean = np.maximum(np.asarray(clean, dtype=np.float32), 0.0)
-    for (number, box), (row, column), (height, width), level in zip(
-        boxes, corners + MARGIN, sides, levels, strict=True
+    for (box, own), level, (row, column), (height, width) in zip(
+        pieces, levels, corners + MARGIN, sides, strict=True
     ):
-        own = charts[box] == number
         result[box][own] = clean[row : row + height, column : column + width][own] * level
     return result
 

@@ -13,7 +13,7 @@ PROBE_KNOBS = (
         "texels around a probe; half as many from top to bottom",
         bakes=True,
     ),
-    Knob("probe_spp", 16, (1, 4, 8, 16, 64, 128, 256, 1024, 2048), "paths a texel", bakes=True),
+    Knob("probe_spp", 16, (1, 4, 16, 64, 128, 256, 1024, 2048), "paths a texel", bakes=True),
     Knob("probe_denoise", False, (False, True), "whether the maps are denoised", bakes=True),
 )
 """The papers have 252 probes of 1024 × 512 at 2048 paths a texel (Rodriguez et al. 2020, section 7) and 256 of the
