@@ -33,7 +33,6 @@ METHOD = Method(
         ),
         Knob("filter", True, (False, True), "second step of the convolution, over the screen"),
         Knob("taps", 12, (4, 8, 12, 24, 48), "samples to either side in a pass of the filter"),
-        Knob("blur", 0.125, (0.0625, 0.125, 0.25, 0.5, 1.0, 2.0), "factor on the covariance of the filter"),
         Knob(
             "history", True, (False, True), "whether the frame before stands in where no probe has a sample"
         ),

@@ -1,9 +1,13 @@
 """How widely a rough surface spreads a point that it reflects over the image.
 
 Rodriguez et al. 2020, section 6.1: a camera looks straight at a plane which reflects a point on the camera's axis. The
-GGX lobe, evaluated at every place of the image, is fitted with a Gaussian by its covariance. All of it depends on the
-two distances by their ratio alone, so the table has two dimensions where the paper's has three, and holds for scenes of
-any size.
+GGX lobe, evaluated at every place of the image, is fitted with a Gaussian. All of it depends on the two distances by
+their ratio alone, so the table has two dimensions where the paper's has three, and holds for scenes of any size.
+
+The fit is the one of least squares, height and width free. The covariance of the lobe itself, which the paper takes, is
+that of its tails: it grows without end with the field of view, and is twice to six times what turns a lobe of half the
+roughness into the whole one. The best fit is the fixed point of a covariance that the Gaussian itself weights, as
+widths of galaxies are measured (Bernstein and Jarvis 2002, Shapes and Shears, Stars and Smears, section 3.1).
 
 The image here is the plane at unit distance before the camera: coordinates are tangents, times a focal length pixels.
 """
@@ -33,21 +37,25 @@ POWER = 3.0
 """Of the spacing: bins lie denser towards smooth surfaces and near reflections. The paper gives no exponent."""
 
 FIELD = 1.0
-"""Tangent of half the field of view in which the lobe is seen. Its tails are so long that the covariance grows without
-end as the field does; the paper says that it is fixed, and not how wide."""
+"""Tangent of half the field of view in which the lobe is seen, for those that are wider than an image."""
 
-RINGS = 4096
+RINGS = 1024
 """Radii at which a lobe is evaluated."""
+
+STEPS = 40
+"""Towards the fixed point. Each halves what is missing, and the first guess is within a factor of 2."""
 
 REDUCED = 0.5
 """Roughness of the materials when probes are rendered, over their own (section 6.1)."""
 
 
 def lobe(alpha: Any, share: Any, radius: Any) -> Any:
-    """GGX lobe at places of the image, without Fresnel's factor.
+    """What places of the image reflect of a small lamp at the point, by the GGX lobe without Fresnel's factor.
 
-    alpha: roughness. share: d_r / (d_c + d_r), of the distances from the plane to the point and to the camera, in
-    (0, 1]. radius: tangent of the angle to the image's centre. Walter et al. 2007, equations 20, 33 and 34.
+    The cosine and the lamp's distance are part of it: without them lobes swell where the point is near. Relative to the
+    lamp's light at the centre. alpha: roughness. share: d_r / (d_c + d_r), of the distances from the plane to the point
+    and to the camera, in (0, 1]. radius: tangent of the angle to the image's centre. Walter et al. 2007, equations 20,
+    33 and 34.
     """
     to_camera = np.arctan(radius)
     to_point = np.arctan(radius * (1 - share) / share)
@@ -57,27 +65,33 @@ def lobe(alpha: Any, share: Any, radius: Any) -> Any:
     def seen(angle):
         return 2 / (1 + np.sqrt(1 + alpha**2 * np.tan(angle) ** 2))
 
-    cosines = np.cos(to_camera) * np.cos(to_point)
-    return density * seen(to_camera) * seen(to_point) / (4 * cosines)
+    bsdf = density * seen(to_camera) * seen(to_point) / (4 * np.cos(to_camera) * np.cos(to_point))
+    return bsdf * np.cos(to_point) ** 3
 
 
 def deviation(alpha: Any, share: Any) -> NDArray[np.float64]:
-    """Standard deviation of the fitted Gaussian along any line through the centre: tangents. Arrays broadcast."""
+    """Standard deviation of the Gaussian that fits the lobe best, along any line through the centre: tangents.
+
+    alpha, share: as for `lobe`, above 0. Arrays broadcast.
+    """
     alpha, share = np.broadcast_arrays(
         np.asarray(alpha, float)[..., None], np.asarray(share, float)[..., None]
     )
-    # Rings that lie as dense as the lobe asks for: equal steps of the logarithm, from well inside of it.
-    first = np.minimum(1e-3 * alpha * share, 1e-3)
-    steps = np.linspace(0, 1, RINGS)
-    radius = first * (FIELD / first) ** steps
-    weight = lobe(alpha, share, radius) * radius**2  # one radius for the ring, one for the step
-    squared = np.trapezoid(weight * radius**2, steps, axis=-1) / np.trapezoid(weight, steps, axis=-1)
-    return np.sqrt(0.5 * squared)
+    # In units of alpha · share; rings in equal steps of the logarithm, from well inside of the lobe to where the
+    # Gaussian is 0 or the field ends.
+    radius = np.geomspace(1e-3, np.minimum(10, FIELD / (alpha * share))[..., 0], RINGS, axis=-1)
+    weight = lobe(alpha, share, alpha * share * radius) * radius**2  # one radius for the ring, one for the step
+    squared = np.ones(alpha.shape)
+    for _ in range(STEPS):
+        seen = weight * np.exp(-0.5 * radius**2 / squared)
+        squared = (seen * radius**2).sum(axis=-1, keepdims=True) / seen.sum(axis=-1, keepdims=True)
+    found: NDArray[np.float64] = (np.sqrt(squared) * alpha * share)[..., 0]
+    return found
 
 
 @cache
 def table() -> NDArray[np.float32]:
-    """(SIZE, SIZE): deviation over alpha · share, by roughness and share. It changes slowly, whatever these are."""
+    """(SIZE, SIZE): deviation over alpha · share, by roughness and share: 1.3, and less towards wide lobes."""
     steps = np.linspace(0, 1, SIZE) ** POWER
     alpha = SMOOTHEST + (ROUGHEST - SMOOTHEST) * steps
     share = np.maximum(steps, 1e-6)

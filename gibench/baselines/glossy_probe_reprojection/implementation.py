@@ -111,7 +111,7 @@ def _recalled(frame, surfaces, color, energy):
     return result
 
 
-def _filtered(footprint, camera, surfaces, mirrored, color, energy, size, unit, blur, reduced, taps):
+def _filtered(footprint, camera, surfaces, mirrored, color, energy, size, unit, reduced, taps):
     """Glossy light after the filter. reduced: roughness in the probes over the surfaces' own."""
     guides = Guides(surfaces["normal"], surfaces["distance"], surfaces["material"], *size, unit)
     reach, distance = mirrored["reach"], surfaces["distance"]
@@ -125,7 +125,7 @@ def _filtered(footprint, camera, surfaces, mirrored, color, energy, size, unit, 
     slant = mi.Vector2f(across - ahead * right / forward, down - ahead * below / forward)
     length = dr.norm(slant)
     slant = dr.select(length > 1e-4, slant / dr.maximum(length, 1e-4), mi.Vector2f(1, 0))
-    scale = dr.sqrt(blur) / camera["scale"]
+    scale = dr.rcp(camera["scale"])
     covariance = slanted(dr.square(own * scale), slant, 1, dr.square(cosine)) - slanted(
         dr.square(baked * scale), slant, 1, dr.square(cosine)
     )
@@ -206,7 +206,6 @@ class GlossyProbeReprojection(OnLightmap):
                     energy,
                     size,
                     unit,
-                    dr.opaque(mi.Float, float(knobs["blur"])),
                     dr.opaque(mi.Float, self._reduced),
                     dr.opaque(mi.UInt32, int(knobs["taps"])),
                 )

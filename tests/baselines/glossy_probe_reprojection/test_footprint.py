@@ -1,4 +1,4 @@
-"""The fitted lobe, against covariances of Mitsuba's own GGX lobe summed over an image."""
+"""The fitted lobe, against Mitsuba's own GGX lobe over an image."""
 
 from __future__ import annotations
 
@@ -6,20 +6,21 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
+from scipy import ndimage, optimize
 
 from gibench.baselines.glossy_probe_reprojection.footprint import (
     FIELD,
+    REDUCED,
     Covariance,
     Footprint,
     slanted,
 )
 
 
-def spread(alpha, camera, point, half, cells=801, angle=0.0, least=0.0):
-    """Covariance (2, 2) over the image of what GGX sends from a point by a plane to a camera, in tangents.
+def seen(alpha, camera, point, half, cells=801, angle=0.0):
+    """What a small lamp sends by a GGX plane to a camera: places of the image x, y (tangents) and radiance there.
 
     camera, point: distances from the plane (m). half: of the image's side. angle: of incidence, the slant along y.
-    least: share of the greatest value below which nothing counts; without it, a disk of radius `half` does.
     """
     axis = (np.arange(cells) + 0.5) / cells * 2 * half - half
     x, y = np.meshgrid(axis, axis)
@@ -39,28 +40,74 @@ def spread(alpha, camera, point, half, cells=801, angle=0.0, least=0.0):
     bsdf = mi.load_dict(metal)
     si = dr.zeros(mi.SurfaceInteraction3f, x.size)
     si.wi = mi.Vector3f(local(eye).T.astype(np.float32))
-    to_lamp = local(lamp)
-    value = np.array(bsdf.eval(mi.BSDFContext(), si, mi.Vector3f(to_lamp.T.astype(np.float32))))[0]
-    weight = (value / to_lamp[:, 2]).reshape(x.shape) * falls
-    weight *= (weight >= least * weight.max()) if least else (x**2 + y**2 <= half**2)
+    to_lamp = mi.Vector3f(local(lamp).T.astype(np.float32))
+    value = np.array(bsdf.eval(mi.BSDFContext(), si, to_lamp), dtype=np.float64)[0].reshape(x.shape)
+    return x, y, falls * value / np.sum((lamp - hit) ** 2, axis=-1)
+
+
+def covariance(x, y, weight):
+    """(2, 2)."""
     moments = [np.sum(weight * a * b) / weight.sum() for a, b in ((x, x), (x, y), (y, y))]
     return np.array([[moments[0], moments[1]], [moments[1], moments[2]]])
 
 
-@pytest.mark.parametrize("alpha", [0.05, 0.2, 0.5])
-@pytest.mark.parametrize(("camera", "point"), [(1.0, 1.0), (0.3, 4.0), (5.0, 0.5)])
-def test_the_table_holds_the_covariance_of_the_lobe(alpha, camera, point):
-    share = point / (camera + point)
-    found = np.array(Footprint().deviation(mi.Float(alpha), mi.Float(share)))[0]
-    direct = spread(alpha, camera, point, FIELD)
-    np.testing.assert_allclose(np.sqrt(np.diag(direct)), found, rtol=0.02)
+def tabled(alpha, share):
+    return np.array(Footprint().deviation(mi.Float(alpha), mi.Float(share)))[0]
+
+
+DISTANCES = pytest.mark.parametrize(("camera", "point"), [(1.0, 1.0), (0.3, 4.0), (5.0, 0.5)])
+
+
+@pytest.mark.parametrize("alpha", [0.005, 0.05, 0.2, 0.5])
+@DISTANCES
+def test_the_table_holds_the_covariance_of_the_lobe_that_the_gaussian_weights(alpha, camera, point):
+    """A Gaussian, weighted with itself, has half of its variance."""
+    found = tabled(alpha, point / (camera + point))
+    x, y, value = seen(alpha, camera, point, min(FIELD, 6 * found))
+    window = np.exp(-0.5 * (x**2 + y**2) / found**2) * (x**2 + y**2 < FIELD**2)
+    direct = covariance(x, y, value * window)
+    np.testing.assert_allclose(np.sqrt(2 * np.diag(direct)), found, rtol=0.01)
     assert abs(direct[0, 1]) < 1e-3 * direct[0, 0]
 
 
+@pytest.mark.parametrize("alpha", [0.005, 0.05, 0.2])
+@DISTANCES
+def test_no_other_gaussian_is_closer_to_the_lobe(alpha, camera, point):
+    found = tabled(alpha, point / (camera + point))
+    x, y, value = seen(alpha, camera, point, 5 * found, 401)
+    squared, value = (x**2 + y**2) / found**2, value / value.max()
+
+    def off(height, width):
+        return (height * np.exp(-0.5 * squared / width**2) - value).ravel()
+
+    best = optimize.least_squares(lambda p: off(*p), (1.0, 0.7)).x
+    assert best[1] == pytest.approx(1, abs=0.015)
+
+
+@pytest.mark.parametrize("alpha", [0.05, 0.2])
+def test_two_steps_of_convolution_give_the_whole_lobe(alpha):
+    """Half of the roughness, then the Gaussian of equation 3, against the lobe itself; and no wider or narrower one."""
+    whole, half = tabled(alpha, 0.5), tabled(REDUCED * alpha, 0.5)
+    side = 12 * whole
+    _, _, wanted = seen(alpha, 1, 1, side, 1201)
+    _, _, sharp = seen(REDUCED * alpha, 1, 1, side, 1201)
+    pixel = 2 * side / 1201
+
+    def missing(factor):
+        blurred = ndimage.gaussian_filter(sharp, factor * np.sqrt(whole**2 - half**2) / pixel)
+        return np.sqrt(np.sum((blurred - wanted) ** 2) / np.sum(wanted**2))
+
+    assert missing(1) < 0.2
+    assert missing(0) > 1
+    assert missing(1) < min(missing(0.8), missing(1.25))
+
+
 def test_only_the_ratio_of_the_distances_counts():
+    x, y, value = seen(0.1, 2, 1, 0.2, 301)
     for scale in (0.01, 100):
+        _, _, other = seen(0.1, 2 * scale, scale, 0.2, 301)
         np.testing.assert_allclose(
-            spread(0.1, 2 * scale, scale, FIELD, 301), spread(0.1, 2, 1, FIELD, 301), rtol=1e-3, atol=1e-9
+            covariance(x, y, other), covariance(x, y, value), rtol=1e-3, atol=1e-9
         )
 
 
@@ -68,8 +115,12 @@ def test_only_the_ratio_of_the_distances_counts():
 def test_slant_narrows_the_lobe_across_and_not_along(degrees):
     """Of the lobe's core, down to a tenth: half vectors turn rays by 2 in the plane of incidence, by 2 cos θ across."""
     angle = np.radians(degrees)
-    straight = spread(0.02, 1, 1, 0.2, angle=0.0, least=0.1)
-    direct = spread(0.02, 1, 1, 0.2, angle=angle, least=0.1)
+
+
+    def core(*image):
+        return covariance(*image[:2], image[2] * (image[2] >= 0.1 * image[2].max()))
+
+    straight, direct = core(*seen(0.02, 1, 1, 0.2)), core(*seen(0.02, 1, 1, 0.2, angle=angle))
     cosine = np.cos(angle)
     expected = slanted(mi.Float(straight[0, 0]), mi.Vector2f(0, 1), mi.Float(1), mi.Float(cosine**2))
     np.testing.assert_allclose(direct[0, 0], float(expected.xx[0]), rtol=0.05)
@@ -95,12 +146,12 @@ def test_principal_directions_are_those_of_numpy_and_never_negative():
     first, second = roots @ roots.swapaxes(-1, -2)
     first[:3], second[:3] = (np.diag([2.0, 2.0]), np.zeros((2, 2)), np.diag([0, 3.0])), 0
 
-    def covariance(matrices):
+    def of(matrices):
         return Covariance(
             *(mi.Float(matrices[:, i, j].astype(np.float32)) for i, j in ((0, 0), (0, 1), (1, 1)))
         )
 
-    a, b, direction = (covariance(first) - covariance(second)).principal()
+    a, b, direction = (of(first) - of(second)).principal()
     values = np.maximum(np.linalg.eigvalsh(first - second)[:, ::-1], 0)
     np.testing.assert_allclose(np.stack([a, b], axis=1), values, atol=1e-5)
     e = np.array(direction).T
