@@ -1,4 +1,4 @@
-"""What the network of `elp` costs a frame: its order of memory against the usual one, modulation against concatenation."""
+"""What the network of `elp` costs a frame: its order of memory, and modulation against concatenation."""
 
 from __future__ import annotations
 

@@ -106,16 +106,13 @@ def test_only_the_ratio_of_the_distances_counts():
     x, y, value = seen(0.1, 2, 1, 0.2, 301)
     for scale in (0.01, 100):
         _, _, other = seen(0.1, 2 * scale, scale, 0.2, 301)
-        np.testing.assert_allclose(
-            covariance(x, y, other), covariance(x, y, value), rtol=1e-3, atol=1e-9
-        )
+        np.testing.assert_allclose(covariance(x, y, other), covariance(x, y, value), rtol=1e-3, atol=1e-9)
 
 
 @pytest.mark.parametrize("degrees", [30, 60, 75])
 def test_slant_narrows_the_lobe_across_and_not_along(degrees):
     """Of the lobe's core, down to a tenth: half vectors turn rays by 2 in the plane of incidence, by 2 cos θ across."""
     angle = np.radians(degrees)
-
 
     def core(*image):
         return covariance(*image[:2], image[2] * (image[2] >= 0.1 * image[2].max()))
