@@ -80,9 +80,8 @@ def deviation(alpha: Any, share: Any) -> NDArray[np.float64]:
     # In units of alpha · share; rings in equal steps of the logarithm, from well inside of the lobe to where the
     # Gaussian is 0 or the field ends.
     radius = np.geomspace(1e-3, np.minimum(10, FIELD / (alpha * share))[..., 0], RINGS, axis=-1)
-    weight = (
-        lobe(alpha, share, alpha * share * radius) * radius**2
-    )  # one radius for the ring, one for the step
+    # One radius for the ring, one for the step.
+    weight = lobe(alpha, share, alpha * share * radius) * radius**2
     squared = np.ones(alpha.shape)
     for _ in range(STEPS):
         seen = weight * np.exp(-0.5 * radius**2 / squared)
