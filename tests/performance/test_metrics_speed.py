@@ -1,29 +1,12 @@
 """How fast the metrics are, as ratios to others measured in turn in the same run; nothing here can fail by time."""
 
-import statistics
-import time
-
 import numpy as np
 import pytest
 
 from gibench import metrics
+from tests.performance.turns import seconds
 
 pytestmark = pytest.mark.performance
-
-REPEATS = 7
-
-
-def seconds(*functions):
-    """Median seconds of each function, run in turn so that a busy machine slows all of them alike."""
-    for function in functions:
-        function()
-    times = [[] for _ in functions]
-    for _ in range(REPEATS):
-        for function, taken in zip(functions, times, strict=True):
-            start = time.perf_counter()
-            function()
-            taken.append(time.perf_counter() - start)
-    return [statistics.median(taken) for taken in times]
 
 
 @pytest.fixture(scope="module")

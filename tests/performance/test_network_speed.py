@@ -2,48 +2,34 @@
 
 from __future__ import annotations
 
-import time
+from functools import partial
 
 import numpy as np
 import pytest
 import torch
 
 from gibench.baselines.efficient_light_probes.network import GUIDES, ReconstructionNetwork
+from tests.performance.turns import seconds
 
 pytestmark = pytest.mark.performance
 
 RESOLUTION = (320, 180)
-ROUNDS = 15
-
-
-def seconds(networks: dict[str, torch.nn.Module]) -> dict[str, float]:
-    """Median of the time of a frame by network, in turns, so that all meet the same machine."""
-    width, height = RESOLUTION
-    generator = torch.Generator().manual_seed(3)
-    image, guides = (torch.rand(1, count, height, width, generator=generator) for count in (3, GUIDES))
-    spent: dict[str, list[float]] = {name: [] for name in networks}
-    with torch.inference_mode():
-        for number in range(ROUNDS + 2):
-            for name, network in networks.items():
-                begin = time.perf_counter()
-                network(image, guides)
-                if number >= 2:
-                    spent[name].append(time.perf_counter() - begin)
-    return {name: float(np.median(values)) for name, values in spent.items()}
 
 
 def test_channels_last_and_the_fusions():
     torch.manual_seed(0)
-    found = seconds(
-        {
-            "modulation": ReconstructionNetwork().eval(),
-            "contiguous": ReconstructionNetwork().to(memory_format=torch.contiguous_format).eval(),
-            "concatenation": ReconstructionNetwork("concatenation").eval(),
-        }
+    width, height = RESOLUTION
+    image, guides = (torch.rand(1, channels, height, width) for channels in (3, GUIDES))
+    networks = (
+        ReconstructionNetwork().eval(),
+        ReconstructionNetwork().to(memory_format=torch.contiguous_format).eval(),
+        ReconstructionNetwork("concatenation").eval(),
     )
-    ours = found["modulation"]
+    with torch.inference_mode():
+        found = seconds(*(partial(network, image, guides) for network in networks), repeats=15)
+    ours, first, mixed = found
     print(
-        f"\nthe network at {RESOLUTION[0]} × {RESOLUTION[1]}: {1e3 * ours:.0f} ms; with channels first "
-        f"{found['contiguous'] / ours:.2f} times as long, with concatenation {found['concatenation'] / ours:.2f}"
+        f"\nthe network at {width} × {height}: {1e3 * ours:.0f} ms; with channels first {first / ours:.2f} times as "
+        f"long, with concatenation {mixed / ours:.2f}"
     )
-    assert np.isfinite(list(found.values())).all()
+    assert np.isfinite(found).all()

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import statistics
-import time
+import itertools
 
 import numpy as np
 import pytest
@@ -11,6 +10,7 @@ import pytest
 from gibench.rendering.backend import select_variant
 from gibench.rendering.render import render_frame
 from gibench.rendering.scene import load_dict
+from tests.performance.turns import seconds
 from tests.rendering import scenes
 
 pytestmark = pytest.mark.performance
@@ -24,15 +24,13 @@ def variant():
 
 
 def _median_ratio(first, second):
-    """Medians of interleaved runs, after one warm-up of each, which compiles the kernels."""
-    times = ([], [])
-    for repeat in range(REPEATS + 1):
-        for run, column in zip((first, second), times, strict=True):
-            start = time.perf_counter()
-            run(repeat)
-            if repeat:
-                column.append(time.perf_counter() - start)
-    a, b = (statistics.median(column) for column in times)
+    """Medians of two functions of a seed, which is another in each run, and their ratio."""
+
+    def seeded(run):
+        seeds = itertools.count()
+        return lambda: run(next(seeds))
+
+    a, b = seconds(seeded(first), seeded(second), repeats=REPEATS)
     return a, b, a / b
 
 
