@@ -5,9 +5,10 @@ GGX lobe, evaluated at every place of the image, is fitted with a Gaussian. All 
 their ratio alone, so the table has two dimensions where the paper's has three, and holds for scenes of any size.
 
 The fit is the one of least squares, height and width free. The covariance of the lobe itself, which the paper takes, is
-that of its tails: it grows without end with the field of view, and is twice to six times what turns a lobe of half the
-roughness into the whole one. The best fit is the fixed point of a covariance that the Gaussian itself weights, as
-widths of galaxies are measured (Bernstein and Jarvis 2002, Shapes and Shears, Stars and Smears, section 3.1).
+that of its tails: it grows without end with the field of view, and a Gaussian of that width, up to six times too wide,
+does not turn the lobe of half the roughness into the whole one. The best fit is the fixed point of a covariance that
+the Gaussian itself weights, as widths of galaxies are measured (Bernstein and Jarvis 2002, Shapes and Shears, Stars and
+Smears: adaptive weights).
 
 The image here is the plane at unit distance before the camera: coordinates are tangents, times a focal length pixels.
 """
@@ -43,7 +44,7 @@ RINGS = 1024
 """Radii at which a lobe is evaluated."""
 
 STEPS = 40
-"""Towards the fixed point. Each halves what is missing, and the first guess is within a factor of 2."""
+"""Towards the fixed point. Each halves what is missing, and the first guess is within a factor of 3."""
 
 REDUCED = 0.5
 """Roughness of the materials when probes are rendered, over their own (section 6.1)."""
