@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
+import numpy as np
 from numpy.typing import NDArray
 
 from gibench.datasets.errors import DatasetError, nearest
 from gibench.datasets.exr import decode, present_channels
 from gibench.datasets.folder import TABLE, room_folder
 from gibench.datasets.manifest import read_manifest, room_record
+from gibench.rendering.camera import PinholeCamera
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -49,6 +52,51 @@ class Frame:
         """Names of the channels in the file."""
         return present_channels(self.path)
 
+    @property
+    def camera(self) -> PinholeCamera:
+        """Its camera, world space in metres, Z up."""
+        position, target = (
+            (float(self.row[f"{what}_x"]), float(self.row[f"{what}_y"]), float(self.row[f"{what}_z"]))
+            for what in ("camera", "target")
+        )
+        return PinholeCamera(position, target, float(self.row["fov"]))
+
+    @property
+    def camera_to_world(self) -> NDArray[np.float64]:
+        """(4, 4) rigid transform from camera space to world space, metres, in OpenCV's convention.
+
+        Camera space has x to the right of the image, y down and z forward; the last column is the position. OpenGL's
+        convention, which NeRF tools take, has the second and third column negated.
+        """
+        camera, matrix = self.camera, np.eye(4)
+        matrix[:3, :3] = camera.frame.T
+        matrix[:3, 3] = camera.position
+        return matrix
+
+    @property
+    def intrinsics(self) -> NDArray[np.float64]:
+        """(3, 3) matrix from camera space (as in `camera_to_world`) to homogeneous pixels.
+
+        The outer corner of the first pixel is (0, 0), its centre (0.5, 0.5).
+        """
+        width, height = int(self.row["width"]), int(self.row["height"])
+        focal = self.camera.focal_length(width)
+        return np.array([[focal, 0, width / 2], [0, focal, height / 2], [0, 0, 1]])
+
+    def _repr_html_(self) -> str:
+        """The frame with all its channels, as a notebook shows it."""
+        import base64
+        import html
+        import io
+
+        from gibench.datasets.previews import frame_panel
+
+        content = io.BytesIO()
+        frame_panel(self).save(content, "png")
+        title = html.escape(f"room {self.room}, view {self.view} ({self.row['kind']}), {self.path}")
+        picture = base64.b64encode(content.getvalue()).decode()
+        return f'<figure><figcaption>{title}</figcaption><img src="data:image/png;base64,{picture}"></figure>'
+
     def __getitem__(self, channel: str) -> NDArray[Any]:
         """Read one channel: (H, W, C) float32, or uint32 for ids. Raises `UnknownChannel`, `StorageError`."""
         return self.read(channel)[channel]
@@ -78,12 +126,43 @@ class Dataset:
         """Number of frames."""
         return len(self.frames)
 
-    def __getitem__(self, index: int) -> Frame:
-        """Return frame number `index`, counted from the end where negative. Raises IndexError."""
-        if not -len(self) <= index < len(self):
-            raise IndexError(f"frame {index} of {len(self)}")
-        row: dict[str, Any] = {str(k): v for k, v in self.frames.iloc[index].to_dict().items()}
-        return Frame(self.root / row["file"], row)
+    @overload
+    def __getitem__(self, index: int | np.integer[Any]) -> Frame: ...
+
+    @overload
+    def __getitem__(self, index: slice | Sequence[int] | NDArray[Any]) -> Dataset: ...
+
+    def __getitem__(self, index: Any) -> Frame | Dataset:
+        """Return one frame by its number, or the dataset of several by a slice, a sequence or a mask.
+
+        Numbers count from the end where negative and may be of any library (a tensor of one element too). Raises
+        IndexError.
+        """
+        if not isinstance(index, slice):
+            numbers = np.asarray(index)
+            if numbers.ndim:
+                return self._part(self._numbers(numbers))
+            number = operator.index(numbers.item() if numbers.dtype != object else index)
+            if not -len(self) <= number < len(self):
+                raise IndexError(f"frame {number} of {len(self)}")
+            row: dict[str, Any] = {str(k): v for k, v in self.frames.iloc[number].to_dict().items()}
+            return Frame(self.root / row["file"], row)
+        return self._part(np.arange(len(self))[index])
+
+    def _numbers(self, index: NDArray[Any]) -> NDArray[np.int64]:
+        if index.ndim != 1 or (index.size and index.dtype.kind not in "iub"):
+            raise IndexError(f"frames by {index.dtype} of shape {index.shape}: give whole numbers or a mask")
+        if index.dtype.kind == "b":
+            if len(index) != len(self):
+                raise IndexError(f"a mask of {len(index)} for {len(self)} frames")
+            return np.flatnonzero(index)
+        wrong = index[(index < -len(self)) | (index >= len(self))]
+        if wrong.size:
+            raise IndexError(f"frame {wrong[0]} of {len(self)}")
+        return index.astype(np.int64)
+
+    def _part(self, numbers: NDArray[Any]) -> Dataset:
+        return Dataset(self.root, self.manifest, self.frames.iloc[numbers].reset_index(drop=True))
 
     def __iter__(self) -> Iterator[Frame]:
         """Go through the frames, in order."""
@@ -94,9 +173,7 @@ class Dataset:
         splits = self.manifest["recipe"]["splits"]
         if name not in splits:
             raise DatasetError(f"{self.root} has no split '{name}'; {nearest(name, splits)}")
-        return Dataset(
-            self.root, self.manifest, self.frames[self.frames["split"] == name].reset_index(drop=True)
-        )
+        return self._part(np.flatnonzero(self.frames["split"] == name))
 
     def room_folder(self, room: int) -> Path:
         """Where a room's scene.xml, room.json and room.glb lie."""

@@ -1,7 +1,11 @@
+import base64
+import io
 import pickle
+import re
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from gibench.datasets import loading, open_dataset
 from gibench.datasets.errors import DatasetError, StorageError, UnknownChannel
@@ -117,3 +121,53 @@ def test_torch_gets_tensors_channels_first(rooms_made):
     assert torch.equal(pickle.loads(pickle.dumps(frames))[5]["depth"], item["depth"])
     (batch,) = DataLoader(frames, batch_size=24, num_workers=1)
     assert batch["color"].shape == (24, 3, 12, 16)
+
+
+def test_several_frames_at_once(rooms_made):
+    dataset = open_dataset(rooms_made)
+    views = [(frame.room, frame.view) for frame in dataset]
+    for index in (slice(3, 9), slice(None, None, -5), slice(30, 40), [0, -1, 7], np.array([5, 5]), []):
+        part = dataset[index]
+        expected = [
+            views[i] for i in np.arange(24)[index if isinstance(index, slice) else np.array(index, int)]
+        ]
+        assert [(frame.room, frame.view) for frame in part] == expected
+    mask = (dataset.frames["view"] == 1).to_numpy()
+    assert {frame.view for frame in dataset[mask]} == {1}
+    assert dataset[2:4][0].path == dataset[2].path
+    for wrong, message in (([24], "frame 24 of 24"), ([0.5], "whole numbers"), (mask[:3], "a mask of 3")):
+        with pytest.raises(IndexError, match=message):
+            dataset[wrong]
+    with pytest.raises(TypeError):
+        dataset[1.5]
+
+
+def test_a_number_of_any_library_is_an_index(rooms_made):
+    torch = pytest.importorskip("torch")
+    dataset = open_dataset(rooms_made)
+    for index in (np.int64(5), np.uint8(5), torch.tensor(5), torch.tensor(-19)):
+        assert dataset[index].path == dataset[5].path
+    assert len(dataset[torch.tensor([1, 2])]) == 2
+
+
+def test_the_matrices_of_a_frame_project_as_its_camera_does(rooms_made):
+    frame = open_dataset(rooms_made)[0]
+    points = np.random.default_rng(0).uniform(-1, 1, (50, 3)) + frame.camera.target
+    matrix = frame.camera_to_world
+    np.testing.assert_allclose(matrix[:3, :3] @ matrix[:3, :3].T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(matrix[:3, :3]) == pytest.approx(1)
+    inside = np.linalg.inv(matrix) @ np.vstack([points.T, np.ones(50)])
+    pixels = frame.intrinsics @ inside[:3]
+    x, y, depth = frame.camera.project(points, (16, 12))
+    np.testing.assert_allclose(pixels[2], depth, rtol=1e-9)
+    np.testing.assert_allclose(pixels[:2] / pixels[2], [x, y], rtol=1e-9)
+
+
+def test_a_notebook_shows_a_frame(rooms_made):
+    frame = open_dataset(rooms_made)[0]
+    shown = frame._repr_html_()
+    picture = re.search(r'src="data:image/png;base64,([^"]+)"', shown)
+    assert picture is not None
+    image = Image.open(io.BytesIO(base64.b64decode(picture[1])))
+    assert image.size[0] > 6 * 256
+    assert "room 0, view 0" in shown
