@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from gibench.errors import GibenchError
 from gibench.generators.light import LUMENS_PER_WATT
 from gibench.generators.parts import Environment
+from gibench.rendering.latlong import LUMINANCE
 
 KINDS = ("none", "sunsky", "hdr")
 
@@ -196,7 +197,7 @@ def _irradiance(path: str, modified: int, size: int) -> float:
     # Latitude bands: cosine at the ground times solid angle, integrated exactly over each row.
     edges = np.pi * np.arange(rows + 1) / len(image)
     weight = np.diff(np.sin(edges) ** 2) / 2 * (2 * np.pi)
-    luminance = image[:rows].mean(1) @ np.array([0.2126, 0.7152, 0.0722])
+    luminance = image[:rows].mean(1) @ LUMINANCE
     irradiance = float(weight @ luminance)
     if irradiance <= 0:
         raise BadEnvironment(
@@ -206,14 +207,17 @@ def _irradiance(path: str, modified: int, size: int) -> float:
 
 
 def read_panorama(path: str) -> NDArray[np.float64]:
-    """(H, W, 3) linear RGB of a panorama that holds only finite values ≥ 0. Raises BadEnvironment."""
+    """(H, 2·H, 3) linear RGB of a panorama that holds only finite values ≥ 0. Raises BadEnvironment."""
     try:
         image = _read_exr(path) if path.lower().endswith(".exr") else _read_hdr(path)
     except Exception as error:  # what Mitsuba raises for a file that is no image differs by format
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise BadEnvironment(f"hdr {path}: not readable as an .hdr or .exr image ({reason})") from error
-    if image.ndim != 3 or min(image.shape[:2]) < 2:
-        raise BadEnvironment(f"hdr {path}: it has the shape {image.shape}; give an equirectangular panorama")
+    if image.ndim != 3 or len(image) < 2 or image.shape[1] != 2 * len(image):
+        size = " × ".join(map(str, image.shape[1::-1]))
+        raise BadEnvironment(
+            f"hdr {path}: it has {size} texels; an equirectangular panorama is twice as wide as high"
+        )
     broken = int((~np.isfinite(image)).sum() + (image < 0).sum())
     if broken:
         raise BadEnvironment(

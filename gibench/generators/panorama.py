@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from gibench.generators.daylight import environment_xml, read_panorama
 from gibench.generators.parts import Environment
+from gibench.rendering.latlong import directions, resampled
 
-WIDTH = 1024
-"""Texels around the horizon: one is 0.35° wide, two thirds of the sun's disc."""
+HEIGHT = 512
+"""Rows; twice as many texels go around the horizon: one is 0.35° wide, two thirds of the sun's disc."""
 
 SUN_RADIUS = math.radians(0.5338 / 2)
 """Of the sun that Mitsuba's `sunsky` draws."""
@@ -30,26 +31,24 @@ SUBSAMPLES = 24
 def panorama(environment: Environment) -> NDArray[np.float32]:
     """Radiance from all directions, W·m⁻²·sr⁻¹, linear Rec. 709: (H, 2·H, 3) float32 with the zenith on top.
 
-    Column i looks along azimuth π/2 − 2π(i + ½)/W, measured about +Z from +X, before the rotation of an "hdr"
-    environment. The sun is averaged over the texels that it touches, so that its light is all there.
+    Laid out as `gibench.rendering.latlong` says, before the rotation of an "hdr" environment. The sun is averaged over
+    the texels that it touches, so that its light is all there.
     """
     if environment.kind == "hdr":
-        return _reduced(read_panorama(str(environment.parameters["path"]))) * float(
-            environment.parameters["scale"]
-        )
-    height = WIDTH // 2
-    rows, columns = np.mgrid[0 : height // 2, 0:WIDTH]
+        image = read_panorama(str(environment.parameters["path"]))
+        return resampled(image, min(len(image), HEIGHT)) * np.float32(environment.parameters["scale"])
+    rows, columns = np.mgrid[0 : HEIGHT // 2, 0 : 2 * HEIGHT]
     values = environment.parameters
-    image = np.zeros((height, WIDTH, 3), np.float32)
+    image = np.zeros((HEIGHT, 2 * HEIGHT, 3), np.float32)
     if values["sky_scale"] > 0:
-        sky = _evaluate(environment, "sky_scale", _directions(rows + 0.5, columns + 0.5))
-        image[: height // 2] = sky * (values["sky_scale"] * values["scale"])
+        sky = _evaluate(environment, "sky_scale", directions(columns + 0.5, rows + 0.5, HEIGHT))
+        image[: HEIGHT // 2] = sky * (values["sky_scale"] * values["scale"])
     if values["sun_scale"] > 0:
         towards = np.asarray(values["sun_direction"])
-        reach = math.cos(SUN_RADIUS + math.pi / height)
-        row, column = np.nonzero(_directions(rows + 0.5, columns + 0.5) @ towards > reach)
+        reach = math.cos(SUN_RADIUS + math.pi / HEIGHT)
+        row, column = np.nonzero(directions(columns + 0.5, rows + 0.5, HEIGHT) @ towards > reach)
         inside = (np.arange(SUBSAMPLES) + 0.5) / SUBSAMPLES
-        places = _directions(row[:, None, None] + inside[:, None], column[:, None, None] + inside)
+        places = directions(column[:, None, None] + inside, row[:, None, None] + inside[:, None], HEIGHT)
         sun = _evaluate(environment, "sun_scale", places).mean(axis=(1, 2))
         image[row, column] += sun * (values["sun_scale"] * values["scale"])
     return image
@@ -75,15 +74,8 @@ def write_panorama(environment: Environment, folder: Path, name: str) -> Element
     return emitter
 
 
-def _directions(row: NDArray[np.float64], column: NDArray[np.float64]) -> NDArray[np.float64]:
-    """World directions (…, 3) of places in the panorama, in texels from its upper left corner."""
-    theta, phi = row * (2 * math.pi / WIDTH), column * (2 * math.pi / WIDTH)
-    sine = np.sin(theta)
-    return np.stack(np.broadcast_arrays(np.sin(phi) * sine, np.cos(phi) * sine, np.cos(theta)), axis=-1)
-
-
-def _evaluate(environment: Environment, part: str, directions: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Radiance of the sky or the sun alone, at a scale of 1, along (…, 3) directions."""
+def _evaluate(environment: Environment, part: str, towards: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Radiance of the sky or the sun alone, at a scale of 1, along (…, 3) unit directions."""
     from gibench.rendering.backend import is_scalar, select_variant
 
     select_variant()
@@ -96,7 +88,7 @@ def _evaluate(environment: Environment, part: str, directions: NDArray[np.float6
     scene = Element("scene", version="3.0.0")
     scene.append(element)
     emitter = mi.load_string(tostring(scene, encoding="unicode")).environment()
-    flat = directions.reshape(-1, 3).astype(np.float32)
+    flat = towards.reshape(-1, 3).astype(np.float32)
     if is_scalar():
         si = dr.zeros(mi.SurfaceInteraction3f)
         light = np.empty_like(flat)
@@ -107,12 +99,4 @@ def _evaluate(environment: Environment, part: str, directions: NDArray[np.float6
         si = dr.zeros(mi.SurfaceInteraction3f, len(flat))
         si.wi = mi.Vector3f(-flat.T)
         light = np.array(emitter.eval(si)).T
-    return np.maximum(light, 0).reshape(directions.shape).astype(np.float32)
-
-
-def _reduced(image: NDArray[np.float64]) -> NDArray[np.float32]:
-    """The image with at most WIDTH columns, by the mean over whole blocks of texels."""
-    block = max(1, -(-image.shape[1] // WIDTH))
-    height, width = image.shape[0] // block, image.shape[1] // block
-    cut = image[: height * block, : width * block]
-    return cut.reshape(height, block, width, block, 3).mean(axis=(1, 3)).astype(np.float32)
+    return np.maximum(light, 0).reshape(towards.shape).astype(np.float32)

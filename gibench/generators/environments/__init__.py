@@ -1,0 +1,1 @@
+"""Environment maps: those that ship, those of the user, and panoramas of generated rooms."""
