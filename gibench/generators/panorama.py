@@ -35,8 +35,8 @@ def panorama(environment: Environment) -> NDArray[np.float32]:
     the texels that it touches, so that its light is all there.
     """
     if environment.kind == "hdr":
-        image = read_panorama(str(environment.parameters["path"])) * float(environment.parameters["scale"])
-        return resampled(image, min(len(image), HEIGHT))
+        own = read_panorama(str(environment.parameters["path"])) * float(environment.parameters["scale"])
+        return resampled(own, min(len(own), HEIGHT))
     rows, columns = np.mgrid[0 : HEIGHT // 2, 0 : 2 * HEIGHT]
     values = environment.parameters
     image = np.zeros((HEIGHT, 2 * HEIGHT, 3), np.float32)
