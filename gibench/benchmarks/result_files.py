@@ -16,22 +16,30 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import shutil
+import re
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+from pydantic import BaseModel
+
 import gibench
+from gibench import gate
+from gibench.benchmarks import records
 from gibench.benchmarks.errors import ResultsError
+from gibench.datasets.checked import parsed, plain, shown
 from gibench.datasets.errors import FolderError
 from gibench.datasets.files import as_json, sync_folder, write_whole
-from gibench.datasets.folder import lock_folder, unlock_folder
+from gibench.datasets.folder import lock_folder, own_leftovers, refuse_links, unlock_folder
 
 #: Version of the layout on disk; a reader refuses what it does not know.
 FORMAT = 1
 
 RUN = "run.json"
+
+#: What a result is called: the first 16 digits of its key.
+ID = "[0-9a-f]{16}"
 
 
 def canonical(config: Mapping[str, Any]) -> bytes:
@@ -93,6 +101,7 @@ class RunFolder:
         """
         try:
             self.root.mkdir(parents=True, exist_ok=True)
+            refuse_links(self.root, self._written())
             foreign = [e.name for e in self.root.iterdir() if not e.name.startswith(".")]
             if foreign and not self.run_file.exists():
                 raise FolderError(
@@ -111,16 +120,29 @@ class RunFolder:
             self.remove_partials()
             unlock_folder(self.root, lock)
 
+    def _written(self) -> list[Path]:
+        """Every folder that a command writes to or deletes from."""
+        folders = [self.results, self.scores, self.logs, self.set_aside]
+        for name in ("scenes", "bakes"):
+            outer = self.root / name
+            inner = outer.iterdir() if gate.real_folder(outer) else ()
+            folders += [outer, *(path for path in inner if path.is_symlink())]
+        return folders
+
     def remove_partials(self) -> None:
-        """Remove what killed processes left; only for the holder of the lock."""
-        for left in self.results.glob(".*.partial*"):
-            shutil.rmtree(left, ignore_errors=True) if left.is_dir() else left.unlink(missing_ok=True)
-        for place in (self.root, self.scores):
-            for left in place.glob(".*.partial-*"):
-                left.unlink(missing_ok=True)
-        for left in self.results.iterdir() if self.results.is_dir() else ():
-            if left.is_dir() and not self.result_file(left.name).exists():
-                shutil.rmtree(left, ignore_errors=True)
+        """Remove what killed processes left; only for the holder of the lock.
+
+        Nothing goes but what carries a result's or a file's own names, and nothing behind a link.
+        """
+        for left in own_leftovers(self.results, rf"\.{ID}\.partial"):
+            _remove_frames(left)
+        for left in own_leftovers(self.results, ID):  # its frames came, its record did not
+            if not os.path.lexists(self.result_file(left.name)):
+                _remove_frames(left)
+        for place in (self.root.resolve(), self.results, self.scores):
+            for left in own_leftovers(place, r"\.[^/]+\.json\.partial-[0-9]+"):
+                if not gate.real_folder(left):
+                    left.unlink(missing_ok=True)
 
     def write_result(self, record: Mapping[str, Any]) -> None:
         """Write a result, and move its frames to their place where it has some. Raises OSError."""
@@ -130,7 +152,7 @@ class RunFolder:
             os.replace(partial, self.predictions(record["id"]))
             sync_folder(self.results)
         else:
-            shutil.rmtree(partial, ignore_errors=True)
+            _remove_frames(partial)
         write_whole(self.result_file(record["id"]), as_json(record))
 
     def put_aside(self, id: str) -> None:
@@ -141,22 +163,15 @@ class RunFolder:
 
     def ids(self) -> list[str]:
         """Of all results."""
-        return sorted(path.stem for path in self.results.glob("*.json") if not path.name.startswith("."))
+        return sorted(path.stem for path in self.results.glob("*.json") if re.fullmatch(ID, path.stem))
 
     def read_result(self, id: str) -> dict[str, Any]:
         """Read a result and check that it is whole. Raises ResultsError: damaged, or of another format."""
         path = self.result_file(id)
-        record = read_json(path, f"remove {path} and {self.predictions(id)}, then run the same command again")
-        _refuse_other_format(path, record)
-        try:
-            whole = record["id"] == id == record["key"][:16] and key_of(record["config"]) == record["key"]
-        except (KeyError, TypeError):
-            whole = False
-        if not whole:
-            raise ResultsError(
-                f"{path} is damaged: it does not say what its name does; remove it and {self.predictions(id)}, then "
-                "run the same command again"
-            )
+        remedy = f"remove {path} and {self.predictions(id)}, then run the same command again"
+        record = self.read_checked(path, records.Result, remedy)
+        if not (record["id"] == id == record["key"][:16] and key_of(record["config"]) == record["key"]):
+            raise ResultsError(f"{path} is damaged: it does not say what its name does; {remedy}")
         return record
 
     def read_run(self) -> dict[str, Any]:
@@ -165,31 +180,39 @@ class RunFolder:
             raise ResultsError(
                 f"{self.root} holds no results: it has no {RUN}; `gibench bench run` makes them"
             )
-        run = read_json(self.run_file, "what it said is lost: run again into a new folder")
-        _refuse_other_format(self.run_file, run)
-        return run
+        return self.read_checked(
+            self.run_file, records.Run, "what it said is lost: run again into a new folder"
+        )
+
+    def read_checked(self, path: Path, model: type[BaseModel], remedy: str) -> dict[str, Any]:
+        """Read a JSON file of this folder that must be what `model` says. Raises ResultsError with `remedy`."""
+        try:
+            content = gate.read_inside(self.root, path.relative_to(self.root))
+            _refuse_other_format(path, plain(content))
+            return parsed(content, model)
+        except gate.GateError as problem:
+            raise ResultsError(f"{path} is damaged ({problem}): {remedy}") from None
+        except ValueError as problem:
+            raise ResultsError(f"{path} is damaged ({problem}): {remedy}") from None
 
     def write_run(self, run: Mapping[str, Any]) -> None:
         """Write `run.json`. Raises OSError."""
         write_whole(self.run_file, as_json(run))
 
 
-def read_json(path: Path, remedy: str) -> dict[str, Any]:
-    """Read a JSON object. Raises ResultsError with `remedy` for what is cut off or something else."""
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as problem:
-        reason = problem.strerror if isinstance(problem, OSError) else "it is cut off or no JSON"
-        raise ResultsError(f"{path} is damaged ({reason}): {remedy}") from None
-    if not isinstance(content, dict):
-        raise ResultsError(f"{path} is damaged (it is no table): {remedy}")
-    return content
+def _remove_frames(folder: Path) -> None:
+    """Remove the frames of a result and their folder; anything else in it stays, and so does the folder then."""
+    for frame in own_leftovers(folder, r"[0-9]{4,}\.exr"):
+        if not gate.real_folder(frame):
+            frame.unlink(missing_ok=True)
+    with suppress(OSError):
+        folder.rmdir()
 
 
 def _refuse_other_format(path: Path, content: Mapping[str, Any]) -> None:
     if content.get("format") != FORMAT:
-        version = content.get("gibench", "of unknown version")
+        there, version = (shown(str(content.get(key, "unknown")))[1:-1] for key in ("format", "gibench"))
         raise ResultsError(
-            f"{path} is of format {content.get('format')}, this gibench {gibench.__version__} reads format {FORMAT}: "
-            f"read it with the gibench that wrote it ({version}), or run again into a new folder"
+            f"{path} is of format {there}, this gibench {gibench.__version__} reads format {FORMAT}: read it with the "
+            f"gibench that wrote it ({version}), or run again into a new folder"
         )

@@ -26,7 +26,8 @@ import gibench
 from gibench import metrics
 from gibench.benchmarks import predictions
 from gibench.benchmarks.errors import ResultsError, RunError
-from gibench.benchmarks.result_files import FORMAT, RunFolder, read_json
+from gibench.benchmarks.records import Scores
+from gibench.benchmarks.result_files import FORMAT, RunFolder
 from gibench.benchmarks.scenes import SceneFiles, scenes_in
 from gibench.datasets.files import as_json, write_whole
 from gibench.datasets.making import default_threads
@@ -172,13 +173,7 @@ def read_scores(folder: RunFolder, name: str) -> dict[str, Any] | None:
     path = folder.score_file(name)
     if not path.exists():
         return None
-    content = read_json(path, f"remove it and run `gibench bench score {folder.root}`")
-    if content.get("format") != FORMAT:
-        raise ResultsError(
-            f"{path} is of format {content.get('format')}, this gibench reads {FORMAT}: remove it and run "
-            f"`gibench bench score {folder.root}`"
-        )
-    return content
+    return folder.read_checked(path, Scores, f"remove it and run `gibench bench score {folder.root}`")
 
 
 def _scored(unit: _Unit) -> tuple[dict[str, str], str]:

@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 
 from gibench.baselines.method import Method
 from gibench.benchmarks.errors import TrackError
+from gibench.datasets.checked import Name
 from gibench.datasets.errors import RecipeError, nearest
 from gibench.datasets.recipes import Recipe, check_recipe
 from gibench.metrics import METRICS
@@ -126,7 +127,7 @@ class Track(_Strict):
     (`gibench.metrics`). source: papers that ask it.
     """
 
-    id: str
+    id: Name
     title: str
     question: str
     varies: Names

@@ -38,7 +38,7 @@ from gibench.baselines.method import Method, Setting, Site, View
 from gibench.baselines.stages import Stages, synchronise
 from gibench.benchmarks import predictions
 from gibench.benchmarks.scenes import SceneFiles, TrainingView, training_views
-from gibench.datasets.files import sync_tree
+from gibench.datasets.files import sync_tree, through_no_link
 from gibench.datasets.pool import end_with_parent
 from gibench.errors import GibenchError
 
@@ -80,7 +80,7 @@ def work(connection: Connection, task: Task) -> None:
     """Body of the process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent decides
     threading.Thread(target=end_with_parent, daemon=True).start()
-    log = open(task.log, "wb", buffering=0)  # noqa: SIM115 - as long as the process
+    log = open(task.log, "wb", buffering=0, opener=through_no_link)  # noqa: SIM115 - as long as the process
     for stream in (1, 2):
         os.dup2(log.fileno(), stream)
     for text in (sys.stdout, sys.stderr):

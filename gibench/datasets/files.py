@@ -15,7 +15,7 @@ def write_whole(path: Path, content: bytes) -> None:
     """
     beside = path.with_name(f".{path.name}.partial-{os.getpid()}")
     try:
-        with open(beside, "wb") as file:
+        with open(beside, "wb", opener=through_no_link) as file:
             file.write(content)
             file.flush()
             os.fsync(file.fileno())
@@ -24,6 +24,11 @@ def write_whole(path: Path, content: bytes) -> None:
         beside.unlink(missing_ok=True)
         raise
     sync_folder(path.parent)
+
+
+def through_no_link(path: str, flags: int) -> int:
+    """Open a file as `open` does, but raise OSError where a link lies under its name: for what is written."""
+    return os.open(path, flags | getattr(os, "O_NOFOLLOW", 0), 0o666)
 
 
 def as_json(value: Any) -> bytes:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import shutil
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from gibench import gate
 from gibench.datasets.errors import FolderError
 
 MANIFEST = "dataset.json"
@@ -32,17 +34,32 @@ def whole_rooms(root: Path) -> list[int]:
     """Numbers of the rooms that are whole, ascending. A room folder gets its name only when it is."""
     rooms = root / "rooms"
     names = [entry.name for entry in rooms.iterdir()] if rooms.is_dir() else []
-    return sorted(int(name) for name in names if name.isdigit() and (rooms / name / RECORD).is_file())
+    return sorted(
+        int(name) for name in names if re.fullmatch("[0-9]{6,9}", name) and (rooms / name / RECORD).is_file()
+    )
 
 
 def remove_partials(root: Path, room: int | None = None) -> None:
-    """Remove what killed processes left of a room, or of all rooms. Only for the holder of the lock."""
-    stem = "*" if room is None else f"{room:06d}"
-    for left in (root / "rooms").glob(f".{stem}.partial-*"):
-        shutil.rmtree(left, ignore_errors=True)
+    """Remove what killed processes left of a room, or of all rooms. Only for the holder of the lock.
+
+    Nothing goes but what carries such a process's own names, and nothing behind a link.
+    """
+    stem = "[0-9]{6,}" if room is None else f"{room:06d}"
+    for left in own_leftovers(root / "rooms", rf"\.{stem}\.partial-[0-9]+"):
+        if gate.real_folder(left):
+            shutil.rmtree(left, ignore_errors=True)
     if room is None:
-        for left in root.glob(".*.partial-*"):
-            left.unlink(missing_ok=True)
+        names = "|".join(map(re.escape, (MANIFEST, TABLE, PREVIEW)))
+        for left in own_leftovers(root.resolve(), rf"\.({names})\.partial-[0-9]+"):
+            if not gate.real_folder(left):
+                left.unlink(missing_ok=True)
+
+
+def own_leftovers(folder: Path, pattern: str) -> list[Path]:
+    """What lies in a folder under names that match a pattern; nothing where the folder is a link."""
+    if not gate.real_folder(folder):
+        return []
+    return [entry for entry in folder.iterdir() if re.fullmatch(pattern, entry.name)]
 
 
 def remove_empty_dataset(root: Path) -> None:
@@ -59,9 +76,11 @@ def claimed(root: Path) -> Iterator[None]:
     On the way out the lock goes, and so do the folders that were made here if nothing was put into them.
     Raises `FolderError`: it is a file, cannot be written, holds something that is no dataset, or is in use.
     """
-    made = [folder for folder in (root, *root.parents) if not folder.exists()]
+    made: list[Path] = []
     try:
+        made = [folder for folder in (root, *root.parents) if not folder.exists()]
         root.mkdir(parents=True, exist_ok=True)
+        refuse_links(root, [root / "rooms"])
         if not (root / MANIFEST).exists():
             _refuse_foreign(root)
         lock = lock_folder(root)
@@ -88,12 +107,27 @@ def _refuse_foreign(root: Path) -> None:
         )
 
 
+def refuse_links(root: Path, folders: Iterable[Path]) -> None:
+    """Raise `FolderError` where one of the folders that a run writes to and deletes from is a link or a file."""
+    for folder in folders:
+        if gate.taken(folder):
+            raise FolderError(
+                f"{folder} is no folder of {root} itself but a link or a file: nothing is written or removed "
+                "through it; put a real folder in its place, or choose another with --out"
+            )
+
+
 def _why_not(root: Path, problem: OSError) -> str:
     if isinstance(problem, FileExistsError | NotADirectoryError):
         return f"{root} is no folder, or lies under a file: choose another with --out"
     if problem.errno == errno.ENOSPC:
         return f"no space is left for {root}: free some, or choose another disk with --out"
-    return f"{root} cannot be written ({problem.strerror}): choose another folder with --out"
+    return f"{_short(root)} cannot be written ({problem.strerror}): choose another folder with --out"
+
+
+def _short(root: Path) -> str:
+    text = str(root)
+    return text if len(text) <= 200 else f"{text[:200]}…"
 
 
 def lock_folder(root: Path) -> int:
@@ -109,7 +143,15 @@ def lock_folder(root: Path) -> int:
         ) from None
 
     while True:
-        descriptor = os.open(root / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
+        # A link would have the lock made, or held, somewhere else.
+        try:
+            descriptor = os.open(root / LOCK, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
+        except OSError as problem:
+            if problem.errno in (errno.ELOOP, errno.EMLINK, errno.EISDIR, errno.ENXIO):
+                raise FolderError(
+                    f"{root / LOCK} is a link or no file: remove it, or choose another folder with --out"
+                ) from None
+            raise
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:

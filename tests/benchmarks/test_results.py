@@ -125,6 +125,6 @@ def test_the_key_does_not_depend_on_how_a_configuration_is_written():
 def test_ids_leave_out_what_is_half_written(tmp_path):
     folder = RunFolder(tmp_path)
     folder.results.mkdir()
-    for name in ("0123.json", ".0123.json.partial-7", "notes.txt"):
+    for name in ("0123456789abcdef.json", ".0123456789abcdef.json.partial-7", "notes.json"):
         (folder.results / name).touch()
-    assert folder.ids() == ["0123"]
+    assert folder.ids() == ["0123456789abcdef"]

@@ -13,6 +13,7 @@ from xml.etree.ElementTree import ElementTree, SubElement, indent
 
 import numpy as np
 
+from gibench import gate
 from gibench.generators.cameras import NoView, sample_path, sample_stills
 from gibench.generators.imported.errors import SceneFileError
 from gibench.generators.imported.glb import write_scene_glb
@@ -135,9 +136,9 @@ def write_imported_room(
             shutil.copyfile(source, folder / name)
         except FileNotFoundError:
             raise SceneFileError(f"{source} was there when the scene was read, and is gone") from None
-    for terms in sorted(room.scene.tree.folder.glob("LICEN[CS]E*")):
-        if terms.is_file():
-            shutil.copyfile(terms, folder / terms.name)
+    for name, content in _terms(room.scene).items():
+        if content is not None:
+            (folder / name).write_bytes(content)
     element = scene_element(room, max_depth=max_depth, resolution=resolution, spp=spp)
     indent(element, "  ")
     ElementTree(element).write(folder / "scene.xml", encoding="utf-8", xml_declaration=True)
@@ -146,6 +147,25 @@ def write_imported_room(
         (folder / OPENINGS).write_text(json.dumps(room.openings.tolist()) + "\n", encoding="utf-8")
     text = json.dumps(describe(room), indent=1, allow_nan=False, ensure_ascii=False)
     (folder / "room.json").write_text(text + "\n", encoding="utf-8")
+
+
+def _terms(scene: ImportedScene) -> dict[str, bytes | None]:
+    """Licences that lie beside a scene, by name; None for one that is a link to a file elsewhere, or no file."""
+    found: dict[str, bytes | None] = {}
+    for path in sorted(scene.tree.folder.glob("LICEN[CS]E*")):
+        try:
+            found[path.name] = None if path.is_dir() else gate.read_inside(path.parent, path.name)
+        except gate.GateError:
+            found[path.name] = None
+    return found
+
+
+def _terms_left_out(scene: ImportedScene) -> list[str]:
+    return [
+        f"{name} beside the scene is no file of its folder, and was not copied: add the licence by hand"
+        for name, content in _terms(scene).items()
+        if content is None and not (scene.tree.folder / name).is_dir()
+    ]
 
 
 def scene_element(room: ImportedRoom, *, max_depth: int, resolution: tuple[int, int], spp: int) -> Node:
@@ -177,7 +197,7 @@ def describe(room: ImportedRoom) -> dict[str, Any]:
             "scale": scene.scale,
             "to_metres_z_up": placed_matrix(scene.up, scene.scale).tolist(),
             "missing": list(scene.missing),
-            "warnings": list(scene.warnings),
+            "warnings": [*scene.warnings, *_terms_left_out(scene)],
             "changes": [
                 {"rule": rule, "what": what, "loss": loss, "count": len(places), "first": places[0]}
                 for (rule, what, loss), places in groups.items()

@@ -1,0 +1,167 @@
+"""What the files of a run must hold before anything is made of them; see `gibench.datasets.checked`."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import AfterValidator, Field, model_validator
+
+from gibench.datasets.checked import Amount, Checked, Count, Fingerprint, Name, Sha256, shown
+from gibench.datasets.errors import nearest
+from gibench.metrics import METRICS
+
+Part = Literal["full", "specular"]
+Setting = bool | int | float | str
+Id = Annotated[str, Field(pattern=r"^[0-9a-f]{16}$")]
+
+
+def _metric(name: str) -> str:
+    if name not in METRICS:
+        raise ValueError(f"there is no metric {shown(name)}; {nearest(name, METRICS)}")
+    return name
+
+
+def _metric_or_side(name: str) -> str:
+    return _metric(name.removesuffix("_prediction").removesuffix("_reference")) and name
+
+
+Metric = Annotated[str, AfterValidator(_metric)]
+"""A metric that there is: it becomes part of a file's name, and is looked up."""
+
+MetricOrSide = Annotated[str, AfterValidator(_metric_or_side)]
+"""The same, or what it measured in the prediction or the reference alone."""
+
+
+class Machine(Checked):
+    """What times depend on. Whatever else is said of a machine is for people."""
+
+    cpu: str
+    cores: Count | None
+    threads: Count
+    gpu: str | None
+    variant: str
+    versions: dict[str, str | None]
+
+
+class ThisMachine(Machine):
+    """The machine of the last command, with its id."""
+
+    id: str
+
+
+class EqualTime(Checked):
+    """What a search for a setting of a given time found."""
+
+    ms: Amount
+    method: Name
+    machine: str
+    label: str | None
+    tried: dict[str, Amount | None]
+
+
+class Run(Checked):
+    """`run.json`."""
+
+    format: int
+    track: Name
+    preset: str
+    seed: Count
+    parts: Annotated[list[Part], Field(min_length=1)]
+    metrics: list[Metric]
+    sequence_metrics: list[Metric]
+    created: str
+    command: str
+    equal_time: list[EqualTime]
+    runs: list[dict[str, Any]]
+    identity: dict[str, Any]
+    base_settings: dict[str, dict[str, Setting]] = Field(default_factory=dict)
+    machine: ThisMachine
+    machines: dict[str, Machine] = Field(default_factory=dict)
+
+
+class Config(Checked):
+    """What a result is keyed by."""
+
+    track: Name
+    scene: Name
+    scene_sha256: Sha256
+    frames: Count
+    method: Name
+    knobs: dict[str, Setting]
+    seed: Count
+    machine: str
+
+
+class FrameTime(Checked):
+    """What a frame took, in seconds."""
+
+    seconds: Amount
+    stages: dict[str, Amount]
+
+
+class Bake(Checked):
+    """Something baked that a preparation used."""
+
+    kind: str
+    seconds: Amount
+    bytes: Count
+
+
+class Prepare(Checked):
+    """What a preparation took, in seconds and bytes."""
+
+    seconds: Amount
+    bytes: Count
+    wall_seconds: Amount
+    stages: dict[str, Amount] = Field(default_factory=dict)
+    bakes: list[Bake] = Field(default_factory=list)
+    lightmap: Amount = 0.0
+    probes: Amount = 0.0
+    references: Amount = 0.0
+    training: Amount = 0.0
+
+
+class Result(Checked):
+    """A result, whole or failed."""
+
+    format: int
+    id: Id
+    key: Sha256
+    config: Config
+    title: str
+    family: str
+    label: str
+    room: Count
+    kind: str
+    created: str
+    machine: Machine
+    status: Literal["ok", "failed"]
+    reason: str = ""
+    traceback: str = ""
+    log: str = ""
+    prepare: Prepare | None = None
+    frames: list[FrameTime] = Field(default_factory=list)
+    files: dict[Annotated[str, Field(pattern=r"^[0-9]{4,6}\.exr$")], Fingerprint] = Field(
+        default_factory=dict
+    )
+    peak_mb: Amount | None = None
+    gpu_mb: Amount | None = None
+
+    @model_validator(mode="after")
+    def _whole(self) -> Self:
+        if self.status == "ok" and not len(self.frames) == len(self.files) == self.config.frames > 0:
+            raise ValueError(
+                f"its path has {self.config.frames} frames, and it holds {len(self.frames)} times and "
+                f"{len(self.files)} files"
+            )
+        return self
+
+
+class Scores(Checked):
+    """The scores of a result, or of the references' own noise. None stands for what has no value."""
+
+    format: int
+    frames: dict[Part, dict[Metric, list[float | None]]]
+    sequences: dict[Part, dict[MetricOrSide, float | None]]
+    skipped: dict[str, str]
+    exposure: Annotated[float, Field(gt=0)] = 1.0
