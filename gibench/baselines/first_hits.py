@@ -8,8 +8,6 @@ from typing import Any
 
 import drjit as dr
 import mitsuba as mi
-import numpy as np
-from numpy.typing import NDArray
 
 from gibench.rendering.camera import PinholeCamera, RayGenerator
 from gibench.rendering.integrator import NOT_DIFFUSE
@@ -79,15 +77,29 @@ def hits_of_rays(
     return FirstHits((width, height), ray, preliminary, si, si.bsdf(ray), active, emission)
 
 
-def pixels(values: Any, hits: FirstHits, grid: int = 1) -> NDArray[np.float32]:
-    """A mi.Color3f of the grid as an image (height, width, 3) float32, each pixel the mean of its grid × grid rays."""
+def pixels(values: Any, hits: FirstHits, grid: int = 1) -> Any:
+    """A mi.Color3f of the grid as an image, each pixel the mean of its grid × grid rays.
+
+    Returns a mi.TensorXf (height, width, 3), evaluated, that stays on the device.
+    """
     return averaged(values, hits.resolution, grid)
 
 
-def averaged(values: Any, resolution: tuple[int, int], grid: int = 1) -> NDArray[np.float32]:
+def averaged(values: Any, resolution: tuple[int, int], grid: int = 1) -> Any:
     """`pixels` of a grid of which only the resolution (width, height) is at hand."""
-    width, height = resolution
-    image = np.array(mi.Color3f(values), dtype=np.float32).T.reshape(height, width, 3)
-    if grid == 1:
-        return image
-    return image.reshape(height // grid, grid, width // grid, grid, 3).mean(axis=(1, 3))
+    width, height = resolution[0] // grid, resolution[1] // grid
+    pixel = dr.arange(mi.UInt32, width * height)
+    columns = dr.opaque(mi.UInt32, width)  # one kernel for all sizes
+    row = pixel // columns
+    corner = (row * columns * grid + (pixel - row * columns)) * grid
+    total = mi.Color3f(0)
+    for down in range(grid):
+        for across in range(grid):
+            total += mi.Color3f(*(_lane(part, corner + down * columns * grid + across) for part in values))
+    image = mi.TensorXf(dr.ravel(total * (1 / grid**2)), (height, width, 3))
+    dr.eval(image)
+    return image
+
+
+def _lane(values: Any, index: Any) -> Any:
+    return values if dr.width(values) == 1 else dr.gather(mi.Float, values, index)

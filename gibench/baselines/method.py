@@ -8,11 +8,14 @@ from __future__ import annotations
 
 import difflib
 import importlib
+import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
+import numpy as np
 from numpy.typing import NDArray
 
 from gibench.errors import GibenchError
@@ -168,18 +171,62 @@ class View:
     seed: int
 
 
-@dataclass(frozen=True, eq=False)
 class Prediction:
-    """What a method says a frame looks like: (H, W, 3) float32, finite, ≥ 0, in the units of the channels.
+    """What a method says a frame looks like: images (H, W, 3), finite, ≥ 0, in the units of the channels.
 
-    color: all of the light. specular: what the first hit reflects by its specular lobe, direct and indirect; None
-    where the method cannot tell it apart.
+    An image is whatever array the method computes with: of NumPy, a tensor of torch, a mi.TensorXf, on any device.
+    It is handed over as it is; the attributes copy it to the host when they are first read, which the benchmark does
+    after its clock has stopped.
     """
 
-    color: NDArray[Any]
-    specular: NDArray[Any] | None = None
-    extra: Mapping[str, float] = field(default_factory=dict)
-    """Numbers worth a column, such as the samples that were spent."""
+    def __init__(
+        self,
+        color: Any,
+        specular: Any = None,
+        extra: Mapping[str, float] | None = None,
+        *,
+        indirect: Any = None,
+    ) -> None:
+        """color: all of the light. specular: what the first hit reflects by its specular lobe, direct and indirect.
+
+        indirect: what comes to the first hit from other surfaces, by both lobes. None where the method cannot tell a
+        part apart. extra: numbers worth a column, such as the samples that were spent.
+        """
+        self._images = {"color": color, "specular": specular, "indirect": indirect}
+        self.extra = dict(extra or {})
+
+    def finish(self) -> None:
+        """Have the device compute what of the images it has put off. Part of a frame's time."""
+        evaluate([image for image in self._images.values() if image is not None])
+
+    @cached_property
+    def color(self) -> NDArray[Any]:
+        """All of the light, on the host."""
+        return on_host(self._images["color"])
+
+    @cached_property
+    def specular(self) -> NDArray[Any] | None:
+        """The specular part, on the host."""
+        return on_host(self._images["specular"])
+
+    @cached_property
+    def indirect(self) -> NDArray[Any] | None:
+        """The indirect part, on the host."""
+        return on_host(self._images["indirect"])
+
+
+def on_host(image: Any) -> Any:
+    """An array of any library as one of NumPy; None stays None."""
+    torch = sys.modules.get("torch")
+    if torch is not None and isinstance(image, torch.Tensor):
+        return image.detach().cpu().numpy()
+    return None if image is None else np.asarray(image)
+
+
+def evaluate(arrays: Any) -> None:
+    """Have Dr.Jit compute those of the arrays that it has put off."""
+    if drjit := sys.modules.get("drjit"):
+        drjit.eval(arrays)
 
 
 class Implementation(Protocol):

@@ -1,4 +1,4 @@
-"""Predicted frames as OpenEXR: `color` as `R`, `G`, `B`, the specular part as the layer `specular`."""
+"""Predicted frames as OpenEXR: `color` as `R`, `G`, `B`, other parts as layers of their names."""
 
 from __future__ import annotations
 
@@ -15,7 +15,10 @@ from gibench.datasets.exr import dark_radiance, fits_half
 
 Image = NDArray[np.float32]
 
-LAYERS = {"full": ("R", "G", "B"), "specular": ("specular.R", "specular.G", "specular.B")}
+LAYERS = {
+    "full": ("R", "G", "B"),
+    **{part: tuple(f"{part}.{component}" for component in "RGB") for part in ("specular", "indirect")},
+}
 
 
 class BadPrediction(MethodError):
@@ -23,15 +26,16 @@ class BadPrediction(MethodError):
 
 
 def checked(prediction: Prediction, resolution: tuple[int, int]) -> dict[str, Image]:
-    """The parts of a prediction, (H, W, 3) float32: "full", and "specular" where there is one.
+    """The parts of a prediction, (H, W, 3) float32: "full", and of "specular" and "indirect" those that there are.
 
     resolution: (width, height) that was asked for. Raises BadPrediction, which says where.
     """
     if not isinstance(prediction, Prediction):
         raise BadPrediction(f"render returned {type(prediction).__name__}, not a Prediction")
     parts = {"full": _checked("color", prediction.color, resolution)}
-    if prediction.specular is not None:
-        parts["specular"] = _checked("specular", prediction.specular, resolution)
+    for part in ("specular", "indirect"):
+        if (image := getattr(prediction, part)) is not None:
+            parts[part] = _checked(part, image, resolution)
     return parts
 
 

@@ -34,7 +34,7 @@ from typing import Any
 import numpy as np
 
 from gibench.baselines.bakes import Bake, BakeCache
-from gibench.baselines.method import Method, Setting, Site, View
+from gibench.baselines.method import Method, Prediction, Setting, Site, View
 from gibench.baselines.stages import Stages, synchronise
 from gibench.benchmarks import predictions
 from gibench.benchmarks.scenes import SceneFiles, TrainingView, training_views
@@ -174,6 +174,8 @@ class _Session:
             synchronise()
             started = time.perf_counter()
             prediction = implementation.render(view, stages)
+            if isinstance(prediction, Prediction):
+                prediction.finish()
             synchronise()
             seconds = time.perf_counter() - started
             try:
@@ -181,7 +183,7 @@ class _Session:
             except predictions.BadPrediction as problem:
                 raise predictions.BadPrediction(f"frame {frame}: {problem}") from None
             if frame and parts.keys() != kinds:
-                raise predictions.BadPrediction(f"frame {frame}: specular is there in some frames only")
+                raise predictions.BadPrediction(f"frame {frame}: some parts are there in some frames only")
             kinds = parts.keys()
             content = predictions.encode(parts)
             name = f"{frame:04d}.exr"

@@ -56,4 +56,5 @@ def mirror_image(scene: Scene, where: Site, resolution: tuple[int, int], grid: i
     preliminary = scene.mi_scene.ray_intersect_preliminary(ray)
     si = preliminary.compute_surface_interaction(ray)
     seen = lightmap.diffuse(si, preliminary) + si.emitter(scene.mi_scene).eval(si)
-    return pixels(mi.Color3f(seen) * mi.Float(np.where(on_floor, tint, 0).astype(np.float32)), hits, grid)
+    shown = mi.Color3f(seen) * mi.Float(np.where(on_floor, tint, 0).astype(np.float32))
+    return np.asarray(pixels(shown, hits, grid))

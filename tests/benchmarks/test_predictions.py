@@ -71,3 +71,20 @@ def test_a_damaged_frame_is_named(tmp_path):
     path.write_bytes(predictions.encode({"full": good()})[:200])
     with pytest.raises(ResultsError, match=r"0000\.exr cannot be read .*run the same command again"):
         predictions.read(path)
+
+
+def test_images_of_any_library_are_taken():
+    torch = pytest.importorskip("torch")
+    from gibench.rendering.backend import select_variant
+
+    select_variant("auto")
+    import mitsuba as mi
+
+    numbers = np.arange(4 * 5 * 3, dtype=np.float32).reshape(4, 5, 3)
+    lazy = mi.TensorXf(numbers) * 2
+    prediction = Prediction(torch.from_numpy(numbers), lazy, indirect=numbers)
+    prediction.finish()
+    parts = checked(prediction, (5, 4))
+    assert parts.keys() == {"full", "specular", "indirect"}
+    np.testing.assert_array_equal(parts["full"], numbers)
+    np.testing.assert_array_equal(parts["specular"], 2 * numbers)

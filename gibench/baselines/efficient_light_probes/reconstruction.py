@@ -8,7 +8,6 @@ from typing import Any, ClassVar
 
 import drjit as dr
 import mitsuba as mi
-import numpy as np
 import torch
 from torch import Tensor
 
@@ -116,7 +115,7 @@ class Reconstruction(ReflectionSearch):
         color, guides, effort = self.inputs(view.camera, view.resolution, stages)
         with stages.stage("inference"), torch.inference_mode():
             output = self.network(self.scale.compressed(color)[None], self.scale.guides(guides)[None])[0]
-            image = self.scale.radiance(output).permute(1, 2, 0).contiguous().cpu().numpy()
+            image = self.scale.radiance(output).permute(1, 2, 0).contiguous()
         count = float(self.network.parameter_count)
         extra = {**effort, "parameters": count, "best_epoch": float(self.epoch)}
-        return Prediction(np.asarray(image, dtype=np.float32), extra=extra)
+        return Prediction(image, extra=extra)

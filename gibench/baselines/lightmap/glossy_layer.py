@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
 
 from gibench.baselines.first_hits import averaged, hits_of_rays
 from gibench.baselines.lightmap.deferred import OnLightmap
@@ -50,11 +51,11 @@ class GlossyLayer(OnLightmap):
         with stages.stage("g-buffer"):
             preliminary, seen, guides = self.kernels["g-buffer"](camera, *fine, denoised)
             base = averaged(seen, fine, grid)
-            images = {name: averaged(values, fine, grid) for name, values in guides.items()}
+            images = {name: np.asarray(averaged(values, fine, grid)) for name, values in guides.items()}
         with stages.stage(self.stage):
             color, extra = self.glossy(view, camera, preliminary)
             specular = averaged(color, fine, grid)
         if denoised:
             with stages.stage("denoising"):
-                specular = denoise(specular, **images)
+                specular = mi.TensorXf(denoise(np.asarray(specular), **images))
         return Prediction(color=base + specular, specular=specular, extra=extra)

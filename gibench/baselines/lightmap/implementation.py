@@ -6,7 +6,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 import drjit as dr
-import numpy as np
+import mitsuba as mi
 
 from gibench.baselines.first_hits import averaged, hits_of_rays
 from gibench.baselines.lightmap.deferred import OnLightmap
@@ -34,4 +34,4 @@ class LightmapMethod(OnLightmap):
             color = averaged(
                 self.kernels["g-buffer"](camera_arrays(view.camera, fine), *fine), fine, self.grid
             )
-        return Prediction(color=color, specular=np.zeros_like(color))
+        return Prediction(color=color, specular=dr.zeros(mi.TensorXf, color.shape))

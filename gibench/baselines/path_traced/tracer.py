@@ -15,8 +15,8 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
 
+from gibench.baselines.first_hits import averaged
 from gibench.baselines.method import Prediction, Setting, Site, View
 from gibench.baselines.replay import Replay, camera_arrays, ray_generator
 from gibench.baselines.stages import Stages
@@ -29,7 +29,8 @@ from gibench.rendering.scene import Scene
 LANES = 1 << 22
 """Paths in flight at once, so that 32 samples of a large frame need no more memory than 2 of them."""
 
-IMAGES = ("emission", "diffuse", "specular", "albedo", "normal")
+GUIDES = ("albedo", "normal")
+IMAGES = ("emission", "diffuse", "specular", *GUIDES)
 
 
 def trace_rows(scene: Scene, camera, seed, first, width, pixels: int, spp: int) -> dict[str, Any]:
@@ -90,16 +91,16 @@ class PathTracer:
         """
         with stages.stage("ray casting"):
             images = self._traced(view)
-        specular = images["specular"]
-        color = images["emission"] + images["diffuse"] + specular
+            color = images["emission"] + images["diffuse"] + images["specular"]
+            color, specular = (averaged(image, view.resolution) for image in (color, images["specular"]))
         if self._denoise:
             with stages.stage("denoising"):
-                guides = {"albedo": images["albedo"], "normal": images["normal"]}
-                color, specular = denoise(color, **guides), denoise(specular, **guides)
+                guides = {name: np.asarray(averaged(images[name], view.resolution)) for name in GUIDES}
+                color, specular = (denoise(np.asarray(image), **guides) for image in (color, specular))
         return Prediction(color, specular)
 
-    def _traced(self, view: View) -> dict[str, NDArray[np.float32]]:
-        """IMAGES as (H, W, 3) float32, means over the samples of a pixel."""
+    def _traced(self, view: View) -> dict[str, Any]:
+        """IMAGES as mi.Color3f with a lane a pixel, means over its samples."""
         width, height = view.resolution
         camera = camera_arrays(view.camera, view.resolution)
         rows = max(LANES // (width * self._spp), 1)
@@ -110,10 +111,10 @@ class PathTracer:
             # Numbers that are not opaque are part of the recording.
             varying = [dr.opaque(mi.UInt32, number) for number in (seed, first, width)]
             images = self._kernel(camera, *varying, count * width, self._spp)
-            parts.append(
-                {
-                    name: np.array(image, dtype=np.float32).T.reshape(count, width, 3)
-                    for name, image in images.items()
-                }
-            )
-        return {name: np.concatenate([part[name] for part in parts]) for name in IMAGES}
+            parts.append(images)
+        if len(parts) == 1:
+            return parts[0]
+        return {
+            name: mi.Color3f(*(dr.concat([part[name][c] for part in parts]) for c in range(3)))
+            for name in IMAGES
+        }
