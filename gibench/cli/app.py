@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from gibench.cli import bench, convert, dataset, doctor, stress
+from gibench.cli import bench, convert, dataset, doctor, exporting, stress
 
 app = typer.Typer(
     name="gibench",
@@ -12,6 +12,7 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
+dataset.app.command("export")(exporting.export)
 app.add_typer(dataset.app, name="dataset")
 app.add_typer(bench.app, name="bench")
 app.command("convert")(convert.convert)
