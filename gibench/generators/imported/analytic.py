@@ -13,7 +13,7 @@ import numpy as np
 from gibench.generators.imported.errors import SceneFileError
 from gibench.generators.imported.reading import Node, SceneTree, new
 from gibench.generators.imported.transforms import numbers, triple
-from gibench.generators.imported.upgrading import Note
+from gibench.generators.imported.upgrading.rules import Note
 from gibench.generators.parts import FloatArray, IntArray, Mesh
 from gibench.generators.scene_files import ply_bytes
 

@@ -9,7 +9,7 @@ from PIL import Image, UnidentifiedImageError
 
 from gibench.generators.imported.errors import SceneFileError
 from gibench.generators.imported.reading import Node, SceneTree, new
-from gibench.generators.imported.upgrading import Note
+from gibench.generators.imported.upgrading.rules import Note
 
 BANDS = {"r": 0, "g": 1, "b": 2, "a": 3}
 

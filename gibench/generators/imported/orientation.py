@@ -21,7 +21,7 @@ from gibench.generators.imported.reading import Node
 from gibench.generators.imported.scene import ImportedScene
 from gibench.generators.imported.survey import hits
 from gibench.generators.imported.turning import with_meshes_turned
-from gibench.generators.imported.upgrading import Change
+from gibench.generators.imported.upgrading.rules import Change
 from gibench.generators.parts import FloatArray
 from gibench.rendering.free_space import NoFreeSpace, free_space, sphere
 from gibench.rendering.scene import Scene

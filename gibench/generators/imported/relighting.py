@@ -11,7 +11,7 @@ from gibench.generators.imported.errors import SceneFileError
 from gibench.generators.imported.files import destinations
 from gibench.generators.imported.reading import Node, copied, new
 from gibench.generators.imported.scene import ImportedScene
-from gibench.generators.imported.upgrading import Change
+from gibench.generators.imported.upgrading.rules import Change
 from gibench.generators.light_shapes import LAMP_MATERIAL
 from gibench.generators.panorama import write_panorama
 from gibench.generators.parts import Environment, Light

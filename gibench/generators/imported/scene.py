@@ -23,7 +23,8 @@ from gibench.generators.imported.shapes import (
     expand_instances,
     name_everything,
 )
-from gibench.generators.imported.upgrading import Change, is_legacy, upgrade
+from gibench.generators.imported.upgrading import is_legacy, upgrade
+from gibench.generators.imported.upgrading.rules import Change
 
 if TYPE_CHECKING:
     from gibench.rendering.scene import Scene

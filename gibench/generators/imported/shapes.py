@@ -8,7 +8,7 @@ from pathlib import Path
 from gibench.generators.imported.errors import SceneFileError
 from gibench.generators.imported.reading import Node, copied, new
 from gibench.generators.imported.transforms import matrix_of
-from gibench.generators.imported.upgrading import Note
+from gibench.generators.imported.upgrading.rules import Note
 
 
 def expand_instances(root: Node, note: Note) -> None:
