@@ -55,6 +55,15 @@ def describe(root: Path, manifest: dict[str, Any]) -> None:
         if totals["kernel_seconds"] > 0:
             speed = amount(totals["paths"] / totals["kernel_seconds"], "paths/s")
             typer.echo(_row("rendering", f"{duration(totals['kernel_seconds'])} in kernels, {speed}"))
+        if changes := totals.get("denoise_changes"):
+            worst = changes[0]
+            typer.echo(
+                _row(
+                    "denoising",
+                    f"warning: changed the mean of a part by more than 3 % in {len(changes)} frames; most in room "
+                    f"{worst['room']}, view {worst['view']}: {100 * worst['change']:+.0f} %. More samples help",
+                )
+            )
         if totals["invalid_paths"]:
             typer.echo(_row("invalid paths", f"{totals['invalid_paths']}, counted as 0"))
     _tell_rejections(manifest.get("rejections", {}), manifest["rejected_rooms"])

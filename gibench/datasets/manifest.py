@@ -151,6 +151,7 @@ def gathered(root: Path, manifest: Mapping[str, Any]) -> tuple[dict[str, Any], p
             for lap in ("build", "write", "load", "render")
         },
         "median_error": float(table["median_error"].median()) if len(table) else None,
+        "denoise_changes": large_changes(table),
         "splits": {split: int((table["split"] == split).sum()) for split in recipe.splits},
     }
     if totals["median_error"] != totals["median_error"]:  # no frame has samples enough for an error
@@ -164,13 +165,26 @@ def gathered(root: Path, manifest: Mapping[str, Any]) -> tuple[dict[str, Any], p
     }, table
 
 
+def large_changes(table: pd.DataFrame) -> list[dict[str, Any]]:
+    """Frames of which denoising changed the mean of a part by more than it may, the largest change first."""
+    from gibench.rendering.denoise import ALLOWED_CHANGE
+
+    size = table["denoise_change"].abs()
+    order = size[size > ALLOWED_CHANGE].sort_values(ascending=False, kind="stable").index
+    return [
+        {"room": int(row.room), "view": int(row.view), "change": float(row.denoise_change)}
+        for row in table.loc[order].itertuples()
+    ]
+
+
 def frame_table(records: Iterable[Mapping[str, Any]], recipe: Recipe) -> pd.DataFrame:
     """Return a row a frame, in the order of rooms and views.
 
     Columns: room, view, split, kind, file (from the dataset's folder), sha256, bytes, width, height,
     camera_x … z and target_x … z (m), fov (horizontal, rad), path, step, exposure (for display), largest
     (value of color), spp, paths, invalid_paths (counted as 0), median_error (relative standard error of
-    color, before denoising), kernel_seconds, denoise_seconds, seconds (all of the renderer's time), seed.
+    color, before denoising), kernel_seconds, denoise_seconds, denoise_change (by how much denoising changed the mean
+    of a part, where it is most), seconds (all of the renderer's time), seed.
     """
     import pandas as pd
 
@@ -198,6 +212,7 @@ def frame_table(records: Iterable[Mapping[str, Any]], recipe: Recipe) -> pd.Data
             "median_error": frame["median_error"],
             "kernel_seconds": frame["kernel_seconds"],
             "denoise_seconds": frame["denoise_seconds"],
+            "denoise_change": frame.get("denoise_change"),  # rooms of older versions have none
             "seconds": frame["seconds"],
             "seed": frame["seed"],
         }
@@ -230,6 +245,7 @@ COLUMNS = {
     "median_error": "float64",
     "kernel_seconds": "float64",
     "denoise_seconds": "float64",
+    "denoise_change": "float64",
     "seconds": "float64",
     "seed": "int64",
 }

@@ -269,6 +269,7 @@ class RoomMaker:
             "median_error": rendered.median_error if math.isfinite(rendered.median_error) else None,
             "kernel_seconds": rendered.kernel_seconds,
             "denoise_seconds": rendered.denoise_seconds,
+            "denoise_change": rendered.denoise_change,
             "seconds": rendered.seconds,
             "seed": frame_seed(self.recipe, room.index, view),
         }

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gibench.rendering.camera import PinholeCamera, check_resolution
 from gibench.rendering.channels import PARTS, SETS, resolve
-from gibench.rendering.denoise import denoise as denoise_image
+from gibench.rendering.denoise import denoise_part, mean_change
 from gibench.rendering.estimate import Estimate, estimate_radiance, frame_of
 from gibench.rendering.scene import Scene
 
@@ -27,7 +27,8 @@ class RenderedFrame:
     arrays: channel → (H, W, C) float32, or uint32 for ids. spp: samples a pixel (0 where no radiance was asked for).
     paths: that were traced. invalid_paths: of these, how many came back with NaN or infinity and count as 0.
     median_error: median relative standard error of color over the pixels, before denoising (NaN where unknown).
-    kernel_seconds: inside the renderer; denoise_seconds; seconds: all of it.
+    kernel_seconds: inside the renderer; denoise_seconds; seconds: all of it. denoise_change: by how much denoising
+    changed the mean of a part, relative, of the part and the channel where it is most.
     """
 
     arrays: dict[str, NDArray[Any]]
@@ -38,16 +39,20 @@ class RenderedFrame:
     kernel_seconds: float
     denoise_seconds: float
     seconds: float
+    denoise_change: float = 0.0
 
 
 def _radiance(
     estimate: Estimate, names: Sequence[str], resolution: tuple[int, int], denoise: bool
-) -> dict[str, NDArray[Any]]:
+) -> tuple[dict[str, NDArray[Any]], float]:
     parts = {name: frame_of(estimate.part(name), resolution) for name in PARTS}
+    change = 0.0
     if denoise:
         guides = {name: frame_of(estimate.part(name), resolution) for name in ("albedo", "normal")}
         # What is seen straight has no noise but that of its edges, which are meant to stay as they are.
-        parts |= {name: denoise_image(parts[name], **guides) for name in PARTS if name != "emission"}
+        clean = {name: denoise_part(parts[name], **guides) for name in PARTS if name != "emission"}
+        change = max((mean_change(clean[name], parts[name]) for name in clean), key=abs)
+        parts |= clean
     result: dict[str, NDArray[Any]] = dict(parts)
     color = np.zeros_like(parts["emission"])
     for name in PARTS:
@@ -55,7 +60,7 @@ def _radiance(
     result["color"] = color
     if "color_se" in names:
         result["color_se"] = frame_of(estimate.standard_error, resolution)
-    return {name: result[name] for name in names}
+    return {name: result[name] for name in names}, change
 
 
 def render_frame(
@@ -89,7 +94,7 @@ def render_frame(
     rest = [n for n in names if n not in SETS["radiance"]]
     arrays: dict[str, NDArray[Any]] = {}
     estimate = Estimate(0, 0)
-    denoise_seconds = 0.0
+    denoise_seconds = denoise_change = 0.0
     if radiance:
         estimate = estimate_radiance(
             scene,
@@ -103,7 +108,8 @@ def render_frame(
             guides=denoise,
         )
         before = time.perf_counter()
-        arrays |= _radiance(estimate, radiance, (width, height), denoise)
+        denoised, denoise_change = _radiance(estimate, radiance, (width, height), denoise)
+        arrays |= denoised
         denoise_seconds = time.perf_counter() - before if denoise else 0.0
     kernel_seconds = estimate.seconds
     if rest:
@@ -121,4 +127,5 @@ def render_frame(
         kernel_seconds=kernel_seconds,
         denoise_seconds=denoise_seconds,
         seconds=time.perf_counter() - start,
+        denoise_change=denoise_change,
     )

@@ -60,6 +60,7 @@ def render_frame(scene: Any, camera: Any, **settings: Any) -> SimpleNamespace:
         median_error=0.1 if spp > 1 else float("nan"),
         kernel_seconds=0.001,
         denoise_seconds=0.0,
+        denoise_change=0.0,
         seconds=0.001,
     )
 

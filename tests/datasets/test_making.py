@@ -396,3 +396,17 @@ def test_a_run_that_fails_in_its_first_room_leaves_nothing_behind(tmp_path):
             root, recipe, work=pool.Work(work.setup, Broken(work.job, 0, OSError(errno.ENOSPC, "full")))
         )
     assert list(tmp_path.iterdir()) == []
+
+
+def test_frames_whose_light_the_denoiser_changed_are_named():
+    import pandas as pd
+
+    from gibench.datasets.manifest import large_changes
+
+    table = pd.DataFrame({"room": [0, 1, 2, 3], "view": [0, 0, 1, 0]}).assign(
+        denoise_change=[0.02, -0.05, 0.2, None]
+    )
+    assert large_changes(table) == [
+        {"room": 2, "view": 1, "change": 0.2},
+        {"room": 1, "view": 0, "change": -0.05},
+    ]

@@ -58,3 +58,62 @@ def test_denoising_is_blind_to_the_unit_of_radiance(level):
     np.testing.assert_allclose(
         denoise.denoise(image * np.float32(level)) / level, denoise.denoise(image), rtol=1e-3
     )
+
+
+def speckled(seed: int = 3) -> np.ndarray:
+    """A part that is mostly dust, with a small coloured highlight and a few stray samples."""
+    rng = np.random.default_rng(seed)
+    image = rng.exponential(1e-4, (96, 128, 3)).astype(np.float32)
+    image[40:44, 60:66] += rng.uniform(2, 4, (4, 6, 1)).astype(np.float32) * np.float32([1, 0.7, 0.3])
+    stray = rng.random((96, 128)) < 0.002
+    image[stray] += np.float32(0.3)
+    return image
+
+
+@pytest.mark.parametrize("level", [1e-30, 1.0, 1e6])
+def test_every_part_keeps_its_mean(level):
+    """The network alone brightens such a highlight by a fifth."""
+    image = speckled() * np.float32(level)
+    raw = image.mean((0, 1), dtype=np.float64)
+    clean = denoise.denoise_part(image)
+    np.testing.assert_allclose(clean.mean((0, 1), dtype=np.float64) / raw, 1, atol=0.03)
+    assert abs(denoise.mean_change(clean, image)) <= denoise.ALLOWED_CHANGE
+    rough = denoise.denoise(image).mean((0, 1), dtype=np.float64)
+    assert np.abs(rough / raw - 1).max() > denoise.ALLOWED_CHANGE
+
+
+def test_what_is_mended_is_the_brightness_that_is_wrong():
+    """A highlight that came back too bright and green is mended; what lies around it stays as it was."""
+    rng = np.random.default_rng(4)
+    truth = np.full((64, 64, 3), 0.02, dtype=np.float32)
+    truth[20:30, 20:40] = (3.0, 2.0, 1.0)
+    samples = truth * rng.gamma(16, 1 / 16, (64, 64, 1)).astype(np.float32)
+    clean = truth.copy()
+    clean[20:30, 20:40] *= np.float32([1.1, 1.5, 1.2])
+    mended = denoise.balanced(clean, samples)
+    np.testing.assert_allclose(mended[20:30, 20:40].mean((0, 1)), (3, 2, 1), rtol=0.04)
+    np.testing.assert_allclose(mended[50:], truth[50:], rtol=0.03)
+
+
+def test_a_mean_that_is_nearly_right_is_left_alone():
+    image = np.random.default_rng(5).exponential(size=(48, 64, 3)).astype(np.float32)
+    clean = np.full_like(image, image.mean())
+    np.testing.assert_array_equal(denoise.balanced(clean, image), np.minimum(clean, clean.max()))
+
+
+def test_the_change_is_that_of_the_channel_that_changed_most():
+    samples = np.ones((4, 4, 3), dtype=np.float32)
+    clean = samples * np.float32([1.0, 0.9, 1.05])
+    assert denoise.mean_change(clean, samples) == pytest.approx(-0.1)
+    assert denoise.mean_change(0 * samples, 0 * samples) == 0
+
+
+def test_a_frame_says_how_much_denoising_changed():
+    scene = load_dict(scenes.box("coat"))
+    options = {"resolution": (48, 48), "channels": ["radiance"], "max_depth": 4, "spp": 8, "seed": 2}
+    raw = render_frame(scene, scenes.CAMERA, **options)
+    clean = render_frame(scene, scenes.CAMERA, denoise=True, **options)
+    assert raw.denoise_change == 0
+    changes = [denoise.mean_change(clean.arrays[n], raw.arrays[n]) for n in PARTS if n != "emission"]
+    assert clean.denoise_change == max(changes, key=abs)
+    assert abs(clean.denoise_change) <= denoise.ALLOWED_CHANGE
