@@ -148,7 +148,9 @@ def _gains(clean: Image, samples: Image, whole: Image) -> Image:
     used = np.flatnonzero(np.bincount(band_of, light, BANDS))
 
     def by_band(values: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.bincount(band_of, np.bincount(step, values, len(light)), BANDS)[used]
+        return np.asarray(
+            np.bincount(band_of, np.bincount(step, values, len(light)), BANDS)[used], dtype=np.float64
+        )
 
     middle = by_band(level * brightness[lit]) / by_band(brightness[lit])
     gains = np.ones_like(clean)

@@ -30,10 +30,12 @@ Rule = Callable[[Node, Note], None]
 
 
 def plugins(root: Node, tag: str, *types: str) -> list[Node]:
+    """All plugins of a tag, or those of some types."""
     return [n for n in root.everything() if n.tag == tag and (not types or n.type in types)]
 
 
 def parents_of(root: Node) -> dict[int, Node]:
+    """The parent of each element, by the id() of the element."""
     return {id(child): node for node in root.everything() for child in node}
 
 
@@ -44,10 +46,12 @@ def become(node: Node, type: str, *children: Node) -> None:
 
 
 def setting(like: Node, tag: str, name: str, value: object) -> Node:
+    """A property, such as `<float name=… value=…/>`."""
     return new(tag, like, name=name, value=str(value))
 
 
 def number(node: Node, text: str) -> float:
+    """The finite number that a text is. Raises SceneFileError."""
     try:
         value = float(text)
     except ValueError:
@@ -69,4 +73,5 @@ def constant_color(node: Node | None, default: float) -> tuple[float, float, flo
 
 
 def rgb(like: Node, name: str, color: tuple[float, ...]) -> Node:
+    """A linear colour as a property."""
     return new("rgb", like, name=name, value=" ".join(repr(round(c, 9)) for c in color))
