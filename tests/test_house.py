@@ -56,3 +56,20 @@ def test_importing_a_room_loads_neither_mitsuba_nor_torch(room):
     code = f"import sys, gibench.{room}; print(sorted({{'mitsuba', 'drjit', 'torch', 'colour'}} & set(sys.modules)))"
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
     assert result.stdout.strip() == "[]", result.stdout + result.stderr
+
+
+def test_what_networks_share_needs_no_renderer():
+    room = PACKAGE / "baselines" / "training"
+    allowed = ("gibench.metrics", "gibench.errors", "gibench.baselines.training")
+    names = ["gibench.baselines.training"]
+    for path in room.rglob("*.py"):
+        names += (
+            []
+            if path.stem == "__init__"
+            else [".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts)]
+        )
+        for name in imports(path):
+            assert name.startswith(allowed) or not name.startswith("gibench"), f"{path.name} imports {name}"
+    code = f"import sys, {', '.join(names)}; print(sorted({{'mitsuba', 'drjit'}} & set(sys.modules)))"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    assert result.stdout.strip() == "[]", result.stdout + result.stderr

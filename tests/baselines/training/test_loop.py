@@ -1,0 +1,330 @@
+"""The loop: that it learns, repeats itself, survives being killed at any step, and ends when it should."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+import torch
+
+from gibench.baselines.training import loop
+from gibench.baselines.training.budget import Budget
+from gibench.baselines.training.checkpoints import Checkpoint
+from gibench.baselines.training.errors import TrainingError
+from gibench.baselines.training.loop import train
+from tests.baselines.training.toys import Duel, Fit, everything, flat, points
+
+STEPS = 12
+BUDGET = Budget(steps=STEPS, look_every=5)
+
+
+class Killed(BaseException):
+    """As a signal would be: nothing but the test catches it."""
+
+
+def dies_at(learner, number):
+    real = learner.step
+
+    def step(batch, now):
+        if now.number == number:
+            # The networks are changed before: a step that is cut off half-way leaves such things behind.
+            with torch.no_grad():
+                for network in learner.networks.values():
+                    for parameter in network.parameters():
+                        parameter.add_(1)
+            raise Killed
+        return real(batch, now)
+
+    learner.step = step
+    return learner
+
+
+def slow(learner, seconds, look=0.0):
+    step, error = learner.step, learner.error
+
+    def slower(batch, now):
+        time.sleep(seconds)
+        return step(batch, now)
+
+    def looks():
+        time.sleep(look)
+        return error()
+
+    learner.step, learner.error = slower, looks
+    return learner
+
+
+def test_it_learns_and_keeps_the_best_weights():
+    learner = Fit()
+    before = learner.look()
+    trained = train(learner, points(), Budget(steps=400), seed=0)
+    assert trained.ended == "steps"
+    assert trained.steps == trained.planned == 400
+    assert trained.best.error < 0.4 * before
+    assert trained.best.error == min(look.error for look in trained.curve)
+    learner.networks["fit"].load_state_dict(trained.weights["fit"])
+    assert learner.look() == trained.best.error
+    assert learner.networks["fit"].training
+
+
+def test_the_curve_begins_untrained_ends_with_the_last_step_and_is_json():
+    trained = train(Fit(), points(), BUDGET, seed=0)
+    assert [look.step for look in trained.curve] == [0, 5, 10, 12]
+    seconds = [look.seconds for look in trained.curve]
+    assert seconds == sorted(seconds)
+    assert seconds[-1] <= trained.seconds
+    assert 0 <= trained.waited <= trained.seconds
+    assert trained.curve[0].loss == 0
+    assert all(look.loss > 0 for look in trained.curve[1:])
+    record = json.loads(json.dumps(trained.record(), allow_nan=False))
+    assert record["curve"][2] == {
+        "step": 10,
+        **{k: record["curve"][2][k] for k in ("seconds", "error", "loss")},
+    }
+    assert record["best"]["error"] == trained.best.error
+
+
+def test_equal_seeds_give_equal_weights_and_others_others():
+    first, second, other = (train(Fit(), points(), BUDGET, seed=seed).weights for seed in (3, 3, 4))
+    assert torch.equal(flat(first), flat(second))
+    assert not torch.equal(flat(first), flat(other))
+
+
+def test_random_numbers_and_modes_of_others_are_left_alone():
+    torch.manual_seed(11)
+    expected = torch.rand(1)
+    torch.manual_seed(11)
+    train(Fit(), points(), BUDGET, seed=0)
+    assert torch.rand(1) == expected
+    assert not torch.are_deterministic_algorithms_enabled()
+
+
+@pytest.mark.parametrize("kind", [Fit, Duel])
+@pytest.mark.parametrize("processes", [0, pytest.param(1, id="loaded beside")])
+def test_cut_off_at_any_step_it_ends_with_the_same_bits(tmp_path, kind, processes):
+    whole = kind()
+    expected = train(whole, points(), BUDGET, seed=2)
+    numbers = range(STEPS) if not processes else (7,)
+    for number in numbers:
+        checkpoint = Checkpoint(tmp_path / f"{number}", {"method": "toy"}, every=0)
+        with pytest.raises(Killed):
+            train(dies_at(kind(), number), points(processes=processes), BUDGET, seed=2, checkpoint=checkpoint)
+        assert checkpoint.path.exists() == (number > 0)
+        learner = kind()
+        made = []
+        real = learner.step
+        learner.step = lambda batch, now, real=real, made=made: (made.append(now.number), real(batch, now))[1]
+        trained = train(learner, points(), BUDGET, seed=2, checkpoint=checkpoint)
+        assert made == list(range(number, STEPS))
+        assert everything(learner) == everything(whole)
+        assert torch.equal(flat(trained.weights), flat(expected.weights))
+        assert [(a.step, a.error, a.loss) for a in trained.curve] == [
+            (b.step, b.error, b.loss) for b in expected.curve
+        ]
+
+
+def test_a_process_that_is_killed_goes_on(tmp_path):
+    """SIGKILL, wherever it happens to be, several times."""
+    code = (
+        "import sys, pathlib; from tests.baselines.training.test_loop import *; "
+        "checkpoint = Checkpoint(pathlib.Path(sys.argv[1]), {'method': 'toy'}, every=0); "
+        "trained = train(slow(Fit(), .01), points(), Budget(steps=90), seed=2, checkpoint=checkpoint); "
+        "torch.save(trained.weights, sys.argv[1] + '.weights')"
+    )
+    place = tmp_path / "checkpoint"
+    for seconds in (0.3, 0.5):
+        process = subprocess.Popen([sys.executable, "-c", code, str(place)])
+        end = time.monotonic() + 60
+        while not place.exists():
+            assert process.poll() is None
+            assert time.monotonic() < end
+            time.sleep(0.01)
+        time.sleep(seconds)
+        os.kill(process.pid, signal.SIGKILL)
+        assert process.wait() == -signal.SIGKILL
+    subprocess.run([sys.executable, "-c", code, str(place)], check=True, timeout=120)
+    expected = train(Fit(), points(), Budget(steps=90), seed=2)
+    assert torch.equal(flat(torch.load(f"{place}.weights")), flat(expected.weights))
+    assert {path.name for path in tmp_path.iterdir()} <= {
+        "checkpoint",
+        "checkpoint.weights",
+        *(path.name for path in tmp_path.glob(".checkpoint.partial-*")),
+    }
+
+
+def test_a_training_that_is_over_is_given_again_without_a_step(tmp_path):
+    checkpoint = Checkpoint(tmp_path / "c", {"method": "toy"})
+    first = train(Fit(), points(), BUDGET, seed=2, checkpoint=checkpoint)
+    again = train(dies_at(Fit(), 0), points(), BUDGET, seed=2, checkpoint=checkpoint)
+    assert again.record() == first.record()
+    assert torch.equal(flat(again.weights), flat(first.weights))
+    checkpoint.remove()
+    checkpoint.remove()
+    assert not checkpoint.path.exists()
+
+
+def test_seconds_end_it_with_the_best_so_far():
+    learner = slow(Fit(), 0.01, look=0.05)
+    trained = train(learner, points(), Budget(steps=10**6, seconds=1.0, look_every=20), seed=0)
+    assert trained.ended == "seconds"
+    assert 0 < trained.steps < 100
+    assert trained.curve[-1].step == trained.steps
+    assert trained.best.error == min(look.error for look in trained.curve)
+    # A step and what a look takes longer than the one before it is all that may be too much.
+    assert trained.seconds < 1.0 + 0.5
+
+
+def test_seconds_that_were_spent_before_count(tmp_path):
+    checkpoint = Checkpoint(tmp_path / "c", {"method": "toy"}, every=0)
+    budget = Budget(steps=10**6, seconds=1.0, look_every=20)
+    with pytest.raises(Killed):
+        train(dies_at(slow(Fit(), 0.02), 20), points(), budget, seed=0, checkpoint=checkpoint)
+    started = time.perf_counter()
+    trained = train(slow(Fit(), 0.02), points(), budget, seed=0, checkpoint=checkpoint)
+    assert time.perf_counter() - started < trained.seconds - 0.35
+    assert trained.seconds >= 0.9
+
+
+def test_where_only_seconds_are_given_the_steps_are_planned_and_can_be_repeated():
+    class Notes(Fit):
+        def __init__(self):
+            super().__init__()
+            self.seen = []
+
+        def step(self, batch, now):
+            self.seen.append(now.progress)
+            return super().step(batch, now)
+
+    learner = slow(Notes(), 0.005)
+    trained = train(learner, points(), Budget(seconds=1.5), seed=0)
+    assert trained.ended in ("steps", "seconds")
+    assert trained.planned > 20
+    assert trained.steps <= trained.planned
+    assert learner.seen == sorted(learner.seen)
+    assert learner.seen[-1] > 0.5
+    planned_at = sum(progress == 0 for progress in learner.seen)
+    assert learner.seen[planned_at:] == [n / trained.planned for n in range(planned_at, trained.steps)]
+
+
+def test_patience_ends_it():
+    learner = Fit(rate=0.0)
+    trained = train(learner, points(), Budget(steps=1000, look_every=5, patience=20), seed=0)
+    assert (trained.ended, trained.steps, trained.best.step) == ("patience", 20, 0)
+
+
+def test_a_loss_that_is_not_finite_ends_it_with_the_best_so_far():
+    class Breaks(Fit):
+        def step(self, batch, now):
+            losses = super().step(batch, now)
+            return losses if now.number < 300 else {"squared error": losses["squared error"] * math.nan}
+
+    trained = train(Breaks(), points(), Budget(steps=1000, look_every=50), seed=0)
+    assert (trained.ended, trained.steps) == ("diverged", 301)
+    assert 0 < trained.best.step <= 300
+    with pytest.raises(TrainingError, match=r"diverged: a loss of step 301 is not finite"):
+        train(Breaks(rate=0.0), points(), Budget(steps=1000, look_every=50), seed=0)
+
+
+def test_an_error_that_is_not_finite_before_the_first_step_is_named():
+    class Blind(Fit):
+        def error(self):
+            return math.nan
+
+    with pytest.raises(TrainingError, match="before the first step is nan"):
+        train(Blind(), points(), BUDGET, seed=0)
+
+
+def test_batches_that_end_are_named():
+    def three(first):
+        return itertools.islice(points()(first), 3)
+
+    with pytest.raises(TrainingError, match="end before step 4"):
+        train(Fit(), three, BUDGET, seed=0)
+
+
+def test_batches_are_put_away_when_it_ends_and_when_it_fails():
+    closed = []
+
+    def kept(first):
+        try:
+            yield from points()(first)
+        finally:
+            closed.append(first)
+
+    train(Fit(), kept, BUDGET, seed=0)
+    with pytest.raises(Killed):
+        train(dies_at(Fit(), 3), kept, BUDGET, seed=0)
+    assert closed == [0, 0]
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({}, "needs an end"),
+        ({"steps": 0}, "steps must be a whole number above 0, not 0"),
+        ({"steps": 1.5}, "steps"),
+        ({"steps": 5, "patience": -1}, "patience"),
+        ({"seconds": 0.0}, "seconds must be above 0"),
+        ({"seconds": math.nan}, "seconds"),
+        ({"seconds": math.inf}, "seconds"),
+    ],
+)
+def test_budgets_that_mean_nothing_are_named(given, said):
+    with pytest.raises(TrainingError, match=said):
+        Budget(**given)
+
+
+def test_an_operation_that_cannot_repeat_its_bits_is_refused_only_when_it_is_asked_for(monkeypatch):
+    """On a CPU: what torch is told is what matters."""
+    seen = []
+
+    class Notes(Fit):
+        def step(self, batch, now):
+            seen.append(torch.are_deterministic_algorithms_enabled())
+            return super().step(batch, now)
+
+    for reproducible in (True, False):
+        train(Notes(), points(), Budget(steps=1), seed=0, reproducible=reproducible)
+    assert seen == [True, False]
+
+
+def test_only_the_product_is_kept():
+    trained = train(Duel(), points(), BUDGET, seed=0)
+    assert set(trained.weights) == {"generator"}
+
+
+def test_on_a_gpu_losses_are_read_less_often(monkeypatch):
+    """What a GPU does, with the device's name alone changed: fewer reads, the same weights."""
+    expected = train(Fit(), points(), BUDGET, seed=0)
+    reads = []
+    real = loop._Run._read
+    monkeypatch.setattr(loop._Run, "_read", lambda run, write: (reads.append(run.step), real(run, write))[1])
+    monkeypatch.setattr(loop._Run, "device", torch.device("meta"), raising=False)
+    monkeypatch.setattr(
+        loop._Run,
+        "__setattr__",
+        lambda run, name, value: name != "device" and object.__setattr__(run, name, value),
+    )
+    trained = train(Fit(), points(), BUDGET, seed=0)
+    assert reads == [5, 10, 12]
+    assert torch.equal(flat(trained.weights), flat(expected.weights))
+    assert [look.loss for look in trained.curve] == [look.loss for look in expected.curve]
+
+
+def test_a_larger_gradient_than_allowed_is_cut_down():
+    learner = Fit()
+    network = learner.networks["fit"]
+    before = [p.detach().clone() for p in network.parameters()]
+    learner.optimisers["fit"] = torch.optim.SGD(network.parameters(), 1.0)
+    learner.descend("fit", 1e9 * network(torch.ones(1, 1)).sum(), largest_gradient=0.5)
+    moved = math.sqrt(
+        sum(float((a.detach() - b).square().sum()) for a, b in zip(network.parameters(), before, strict=True))
+    )
+    assert moved == pytest.approx(0.5, rel=1e-4)
