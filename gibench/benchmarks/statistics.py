@@ -1,7 +1,7 @@
 """Means over rooms with their intervals, and paired differences: which method is better, and how sure that is.
 
-Rooms are what is drawn at random; frames of a room resemble each other, so intervals come from drawing rooms, then
-frames inside them (`gibench.metrics.mean_interval`). Several seeds of a trained method are frames of the same room.
+Rooms are what is drawn at random; frames of a room resemble each other, so intervals come from the spread of rooms, and
+of a trained method from that of its seeds too, which are crossed with the rooms (`gibench.metrics.mean_interval`).
 Errors do not depend on the machine and are pooled over machines; times are not.
 """
 
@@ -85,7 +85,7 @@ def leaderboard(results: Results, name: str, part: str = "full") -> pd.DataFrame
     rows = []
     for (label, machine), group in results.results.groupby(["label", "machine"], sort=False):
         own = values[(values["label"] == label) & (values["machine"] == machine)]
-        interval = mean_interval(own["value"], own["scene"]) if len(own) else None
+        interval = mean_interval(*_by_seed(own, "scene")) if len(own) else None
         good = group[group["status"] == "ok"]
         rows.append(
             {
@@ -126,16 +126,18 @@ def labels_of(results: Results, name: str) -> list[str]:
 def difference(first: tuple[Results, str], second: tuple[Results, str], name: str, part: str) -> Difference:
     """Compare two labels on the frames that both have. The two may come from different folders.
 
-    Scenes are the same where their content is. Seeds are averaged. Raises ResultsError where nothing is shared.
+    Scenes are the same where their content is. A frame counts where every seed has it. Raises ResultsError where
+    nothing is shared.
     """
     tables = [_by_frame(results, label, name, part) for results, label in (first, second)]
-    both = tables[0].merge(tables[1], on=["content", "frame"], suffixes=("_first", "_second"))
+    both = tables[0].index.intersection(tables[1].index)
     if both.empty:
         raise ResultsError(
             f"'{first[1]}' and '{second[1]}' share no frame with a {name} of the {part} image: compare runs of the "
             "same track, preset and seed"
         )
-    interval = paired_difference(both["value_first"], both["value_second"], both["content"])
+    values = [table.loc[both].to_numpy().T for table in tables]
+    interval = paired_difference(values[0], values[1], both.get_level_values("content").to_numpy())
     noise = floor(first[0], name, part)
     return Difference(
         first[1], second[1], name, part, interval, noise, verdict(interval, noise, METRICS[name].direction)
@@ -152,8 +154,20 @@ def verdict(interval: Interval, noise: float, direction: str) -> Verdict:
 
 
 def _by_frame(results: Results, label: str, name: str, part: str) -> pd.DataFrame:
+    """A row a frame, indexed by content and frame, and a column a seed."""
     values = frame_values(results, name, part)
     values = values[values["label"] == label]
     contents = {r["config"]["scene"]: r["config"]["scene_sha256"] for r in results.records()}
     values = values.assign(content=values["scene"].map(contents))
-    return values.groupby(["content", "frame"])["value"].mean().reset_index()
+    return seeds_apart(values, "content")
+
+
+def seeds_apart(values: pd.DataFrame, room: str) -> pd.DataFrame:
+    """A row a frame that every seed has, indexed by room and frame, and a column a seed. room: the column of rooms."""
+    return values.pivot_table(index=[room, "frame"], columns="seed", values="value").dropna()
+
+
+def _by_seed(values: pd.DataFrame, room: str) -> tuple[np.ndarray, np.ndarray]:
+    """Values (S, F) and the rooms of the frames (F,)."""
+    table = seeds_apart(values, room)
+    return table.to_numpy().T, table.index.get_level_values(room).to_numpy()

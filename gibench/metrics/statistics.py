@@ -1,8 +1,13 @@
-"""How sure a mean over frames is, when the frames come from rooms.
+"""How sure a mean over frames is, when the frames come from rooms and the method from seeds.
 
-Frames of one room resemble each other, so that a hundred frames of three rooms say little more than three
-numbers. The bootstrap here draws rooms first and then frames inside each room (Davison & Hinkley 1997,
-Bootstrap methods and their application, section 3.8). Every room weighs the same, however many frames it has.
+Frames of one room resemble each other, so that a hundred frames of three rooms say little more than three numbers: a
+room counts by the mean of its frames, and every room weighs the same. Seeds of a method that is trained are a factor
+crossed with the rooms: a seed that trained badly is bad in all of them, however many there are.
+
+Intervals are Student's, with the variances of rooms and seeds taken apart as in a two-way analysis of variance with
+random effects (Searle, Casella & McCulloch 1992, Variance components, chapter 4) and the degrees of freedom of their
+sum after Satterthwaite (1946, An approximate distribution of estimates of variance components, Biometrics Bulletin
+2(6)). A bootstrap of three seeds knows a third too little of their variance, and nothing of how badly it knows it.
 """
 
 from dataclasses import dataclass
@@ -12,8 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from gibench.metrics.errors import MetricInputError, NonFiniteError, ShapeError
 
-RESAMPLES = 4000
-"""Enough that the ends of a 95 % interval move by a few percent of its width from seed to seed."""
+DUST = 1e-12
+"""Standard error, over the size of the values, below which it is what rounding leaves of none."""
 
 
 @dataclass(frozen=True)
@@ -22,9 +27,9 @@ class Interval:
 
     Attributes:
         mean: the mean over rooms of each room's mean.
-        low, high: the ends of the percentile interval.
-        level: the confidence that it is meant to have.
-        rooms, frames: how many there were. With fewer than about ten rooms such an interval is too narrow.
+        low, high: the ends; infinite where a single value says nothing of how values differ.
+        level: the confidence that it has.
+        rooms, frames: how many there were. With one room it is of that room alone, from its frames.
     """
 
     mean: float
@@ -40,67 +45,40 @@ class Interval:
         return self.low > 0 or self.high < 0
 
 
-def mean_interval(
-    values: ArrayLike, rooms: ArrayLike, *, level: float = 0.95, resamples: int = RESAMPLES, seed: int = 0
-) -> Interval:
-    """Bootstrap the mean of a metric over rooms and frames.
+def mean_interval(values: ArrayLike, rooms: ArrayLike, *, level: float = 0.95) -> Interval:
+    """The mean of a metric over rooms, and how sure it is.
 
     Args:
-        values: (F,), the metric of each frame, in any unit.
+        values: (F,), the metric of each frame, in any unit; or (S, F), a row a seed of the same frames.
         rooms: (F,), the room of each frame: integers or strings.
         level: the confidence level, in (0, 1).
-        resamples: how many times rooms and frames are drawn.
-        seed: of the draws; the same seed gives the same interval.
 
     Returns:
-        The mean and its percentile interval.
+        The mean and its interval.
 
     Raises:
-        ShapeError: when values and rooms are not two lists of one length, or are empty.
+        ShapeError: when values and rooms do not fit, or are empty.
         NonFiniteError: for NaN (an empty mask) and infinity (the PSNR of equal images): leave such frames out
             knowingly, of both methods where two are compared.
-        MetricInputError: for a level outside (0, 1) or no resamples.
+        MetricInputError: for a level outside (0, 1).
     """
-    samples = np.asarray(values, dtype=np.float64)
-    groups = np.asarray(rooms)
-    if samples.ndim != 1 or samples.shape != groups.shape or not samples.size:
-        raise ShapeError(
-            f"values {samples.shape} and rooms {groups.shape} must be two lists of one length ≥ 1"
-        )
-    if not np.isfinite(samples).all():
-        wrong = np.flatnonzero(~np.isfinite(samples))
-        raise NonFiniteError(f"values has {len(wrong)} non-finite values, the first at frame {wrong[0]}")
-    if not 0 < level < 1 or resamples < 1:
-        raise MetricInputError(
-            f"level must lie in (0, 1) and resamples be positive, not {level} and {resamples}"
-        )
-
-    names, index = np.unique(groups, return_inverse=True)
-    members = [samples[index == room] for room in range(len(names))]
-    means = _resampled_means(members, resamples, np.random.default_rng(seed))
-    low, high = np.quantile(means, [(1 - level) / 2, (1 + level) / 2])
-    mean = float(np.mean([room.mean() for room in members]))
-    return Interval(mean, float(low), float(high), level, len(names), samples.size)
+    table = _checked("values", values, rooms)
+    return _interval(table.mean(axis=0), [table], rooms, level)
 
 
 def paired_difference(
-    first: ArrayLike,
-    second: ArrayLike,
-    rooms: ArrayLike,
-    *,
-    level: float = 0.95,
-    resamples: int = RESAMPLES,
-    seed: int = 0,
+    first: ArrayLike, second: ArrayLike, rooms: ArrayLike, *, level: float = 0.95
 ) -> Interval:
-    """Bootstrap the mean difference of two methods on the same frames, first less second.
+    """The mean difference of two methods on the same frames, first less second, and how sure it is.
 
-    Both methods meet the same easy and hard frames, so the difference is far surer than the two means are.
+    Both methods meet the same easy and hard frames, so the difference is far surer than the two means are. Seeds are
+    each method's own: seed 0 of one has nothing to do with seed 0 of the other.
 
     Args:
-        first: (F,), the metric of each frame for one method.
-        second: (F,), the same for the other, frame by frame.
+        first: (F,) or (S, F), the metric of each frame for one method, a row a seed.
+        second: (F,) or (S', F), the same for the other, frame by frame.
         rooms: (F,), the room of each frame.
-        level, resamples, seed: see `mean_interval`.
+        level: see `mean_interval`.
 
     Returns:
         The mean difference and its interval.
@@ -108,20 +86,70 @@ def paired_difference(
     Raises:
         ShapeError, NonFiniteError, MetricInputError: see `mean_interval`.
     """
-    a, b = np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64)
-    if a.shape != b.shape:
-        raise ShapeError(f"first has shape {a.shape} and second {b.shape}: a pair needs the same frames")
-    with np.errstate(invalid="ignore"):  # ∞ − ∞ becomes NaN, which is refused below
-        return mean_interval(a - b, rooms, level=level, resamples=resamples, seed=seed)
+    a, b = _checked("first", first, rooms), _checked("second", second, rooms)
+    return _interval(a.mean(axis=0) - b.mean(axis=0), [a, b], rooms, level)
 
 
-def _resampled_means(
-    members: list[NDArray[np.float64]], resamples: int, rng: np.random.Generator
-) -> NDArray[np.float64]:
-    # Room by room: how often each resample drew the room, and the mean of the frames drawn each time.
-    counts = rng.multinomial(len(members), np.full(len(members), 1 / len(members)), size=resamples)
-    totals = np.zeros(resamples)
-    for room, times in zip(members, counts.T, strict=True):
-        draws = room[rng.integers(len(room), size=(int(times.sum()), len(room)))].mean(axis=1)
-        np.add.at(totals, np.repeat(np.arange(resamples), times), draws)
-    return totals / len(members)
+def _checked(name: str, values: ArrayLike, rooms: ArrayLike) -> NDArray[np.float64]:
+    """Values as (S, F)."""
+    samples, groups = np.asarray(values, dtype=np.float64), np.asarray(rooms)
+    if samples.ndim not in (1, 2) or groups.shape != samples.shape[-1:] or not samples.size:
+        raise ShapeError(
+            f"{name} {samples.shape} and rooms {groups.shape} must be (F,) or (S, F), and (F,), with F ≥ 1"
+        )
+    if not np.isfinite(samples).all():
+        wrong = np.argwhere(~np.isfinite(samples))
+        raise NonFiniteError(f"{name} has {len(wrong)} non-finite values, the first at frame {wrong[0][-1]}")
+    return np.atleast_2d(samples)
+
+
+def _interval(
+    effect: NDArray[np.float64], tables: list[NDArray[np.float64]], rooms: ArrayLike, level: float
+) -> Interval:
+    """effect: (F,), what the mean is of. tables: (S, F) each, whose seeds it was averaged over."""
+    if not 0 < level < 1:
+        raise MetricInputError(f"level must lie in (0, 1), not {level}")
+    names, index = np.unique(np.asarray(rooms), return_inverse=True)
+    alone = len(names) == 1
+    # In one room its frames are what there is of a spread.
+    units = effect if alone else _by_room(effect[None], index)[0]
+    mean = float(units.mean())
+    variance, uncertainty = 0.0, 0.0
+    if len(units) > 1:
+        variance = float(units.var(ddof=1)) / len(units)
+        uncertainty = variance**2 / (len(units) - 1)
+    for table in tables:
+        more, how_unsure = _of_seeds(table if alone else _by_room(table, index))
+        variance, uncertainty = variance + more, uncertainty + how_unsure
+    if len(units) == 1:
+        half = np.inf
+    elif np.sqrt(variance) <= DUST * max(np.abs(table).max() for table in tables):
+        half = 0.0
+    else:
+        from scipy.stats import t
+
+        half = float(t.ppf((1 + level) / 2, variance**2 / uncertainty) * np.sqrt(variance))
+    return Interval(mean, mean - half, mean + half, level, len(names), effect.size)
+
+
+def _by_room(table: NDArray[np.float64], index: NDArray[np.intp]) -> NDArray[np.float64]:
+    """Means of (S, F) over the frames of each room: (S, R)."""
+    counts = np.bincount(index)
+    return np.stack([np.bincount(index, weights=row) / counts for row in table])
+
+
+def _of_seeds(table: NDArray[np.float64]) -> tuple[float, float]:
+    """What seeds add to the variance of the mean of (S, R), and the sum of squares over degrees of freedom.
+
+    What a seed and a room have together is in the spread of the rooms already, and is taken out.
+    """
+    seeds, rooms = table.shape
+    if seeds == 1 or rooms == 1:
+        return 0.0, 0.0
+    by_seed = table.mean(axis=1)
+    rest = table - table.mean(axis=0) - by_seed[:, None] + table.mean()
+    together = float((rest**2).sum()) / ((seeds - 1) * (rooms - 1)) / (seeds * rooms)
+    own = float(by_seed.var(ddof=1)) / seeds
+    if own <= together:
+        return 0.0, 0.0
+    return own - together, own**2 / (seeds - 1) + together**2 / ((seeds - 1) * (rooms - 1))

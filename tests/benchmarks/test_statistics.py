@@ -141,6 +141,15 @@ def test_seeds_are_averaged_before_frames_are_paired():
     assert found.interval.mean == pytest.approx((-0.1 * results.level).mean())
 
 
+def test_a_frame_that_one_seed_lacks_is_not_compared():
+    results = fake({"a": 0.1, "b": 0.2}, seeds=(0, 1))
+    gone = (results.frames["result"] == "a00m") & (results.frames["frame"] == 2)
+    assert gone.sum() == 1
+    results.frames.loc[gone, "value"] = np.nan
+    found = difference((results, "a"), (results, "b"), "rmse", "full")
+    assert found.interval.frames == ROOMS * FRAMES - 1
+
+
 def test_runs_are_paired_by_what_the_scenes_hold():
     first, second = fake({"a": 0.1}), fake({"a": 0.1})
     second.records = lambda: [

@@ -179,7 +179,7 @@ def _title(figure: Figure, title: str, about: str) -> None:
 def _about(summary: Summary, track: str, part: str, machine: str | None) -> str:
     rooms = int(summary.entries.loc[summary.entries["track"] == track, "rooms"].max())
     over = (
-        f"{rooms} rooms, 95 % intervals clustered by room"
+        f"{rooms} rooms, 95 % intervals over rooms and seeds"
         if rooms > 1
         else "one room, 95 % intervals over its frames"
     )

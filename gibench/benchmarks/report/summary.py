@@ -32,7 +32,7 @@ class Summary:
     curve, rooms and failed_rooms (how many), seeds, `COSTS` (means over rooms) and peak_mb (the largest).
     results: the run's results with their `entry`.
     values: metric by entry, scene, frame, part, seeds averaged; frame is -1 for metrics in time.
-    scores: a row by entry, part and metric: mean, low and high (95 %, clustered by room), rooms, frames, left_out
+    scores: a row by entry, part and metric: mean, low and high (95 %, over rooms and seeds), rooms, frames, left_out
     (frames without a finite value), floor (of the reference), difference, difference_low and difference_high against
     the chosen setting on the frames that both have, and verdict: what may be said of that difference
     (`gibench.benchmarks.statistics.verdict`).
@@ -91,11 +91,12 @@ def summarise(source: ReportSource, *, against: str | None = None) -> Summary:
         raise ReportError(f"{source.root}: its results are not scored; gibench bench score does that")
     chosen = None if against is None else _label(results, against)
     results["machine"] = results["machine"].map(machine_names(source.run, list(results["machine"].unique())))
-    values = _values(source, results)
+    by_seed = _by_seed(source, results)
+    values = _values(by_seed)
     by_frame = _with_time(source.floor).groupby(["scene", "frame", "part", "metric"])["value"]
     floor = by_frame.mean().reset_index()
     entries = _entries(results)
-    scores = pd.DataFrame(_scores(entries, values, floor, chosen), columns=_SCORE_COLUMNS)
+    scores = pd.DataFrame(_scores(entries, by_seed, floor, chosen), columns=_SCORE_COLUMNS)
     return Summary(entries, results, values, scores, floor, chosen)
 
 
@@ -140,16 +141,21 @@ def _with_time(table: pd.DataFrame) -> pd.DataFrame:
     return table.assign(frame=frame)
 
 
-def _values(source: ReportSource, results: pd.DataFrame) -> pd.DataFrame:
+def _by_seed(source: ReportSource, results: pd.DataFrame) -> pd.DataFrame:
+    """A row by entry, scene, frame, part, metric and seed."""
     import pandas as pd
 
     columns = ["result", "frame", "metric", "part", "value"]
     tables = [source.frames[columns], _with_time(source.sequences)[columns]]
     rows = pd.concat([table for table in tables if not table.empty] or tables[:1])
     rows = rows[rows["metric"].isin(list(METRICS))].astype({"value": float, "frame": int})
-    done = results.loc[results["status"] == "ok", ["result", "entry", "scene"]]
+    done = results.loc[results["status"] == "ok", ["result", "entry", "scene", "seed"]]
+    return rows.merge(done, on="result").drop(columns="result")
+
+
+def _values(by_seed: pd.DataFrame) -> pd.DataFrame:
     keys = ["entry", "scene", "frame", "part", "metric"]
-    joined = rows.merge(done, on="result").assign(lost=lambda table: ~np.isfinite(table["value"]))
+    joined = by_seed.assign(lost=~np.isfinite(by_seed["value"]))
     means = joined.groupby(keys, as_index=False).agg(value=("value", "mean"), lost=("lost", "any"))
     # One seed without a number leaves the frame without one, where it will be counted.
     return means.assign(value=means["value"].where(~means["lost"])).drop(columns="lost")
@@ -212,22 +218,25 @@ def _scores(
 ) -> list[dict[str, Any]]:
     rows = []
     for (part, metric), table in values.groupby(["part", "metric"], sort=True):
-        grid = table.pivot(index=["scene", "frame"], columns="entry", values="value")
+        # An infinite value of one seed leaves the frame out, as a missing one does.
+        finite_table = table.assign(value=table["value"].where(np.isfinite(table["value"])))
+        grid = finite_table.pivot(index=["scene", "frame"], columns=["entry", "seed"], values="value")
         rooms = grid.index.get_level_values("scene").to_numpy()
         noise = floor[(floor["part"] == part) & (floor["metric"] == metric)]
-        for entry in grid.columns:
+        for entry in grid.columns.unique("entry"):
             measured = grid.index.isin(_frames_of(table, entry))
-            column = grid[entry].to_numpy()
-            finite = np.isfinite(column)
+            seeds = grid[entry].to_numpy()  # a row a frame, a column a seed
+            finite = np.isfinite(seeds).all(axis=1)
             scenes = set(rooms[measured])
             own_noise = noise[noise["scene"].isin(scenes) & np.isfinite(noise["value"])]
             level = own_noise.groupby("scene")["value"].mean().mean() if len(own_noise) else math.nan
             row: dict[str, Any] = {"entry": entry, "part": part, "metric": metric, "floor": float(level)}
             row["left_out"] = int((measured & ~finite).sum())
-            row |= _mean(column[finite], rooms[finite])
+            row |= _mean(seeds[finite].T, rooms[finite])
             other = _opponent(entries, entry, against)
-            if other in grid.columns:
-                row |= _difference(column, grid[other].to_numpy(), rooms, METRICS[str(metric)], float(level))
+            if other in grid.columns.unique("entry"):
+                opponent = grid[other].to_numpy()
+                row |= _difference(seeds, opponent, rooms, METRICS[str(metric)], float(level))
             rows.append(row)
     return rows
 
@@ -237,7 +246,7 @@ def _frames_of(table: pd.DataFrame, entry: Any) -> pd.MultiIndex:
 
 
 def _mean(values: np.ndarray, rooms: np.ndarray) -> dict[str, Any]:
-    if not len(values):
+    if not len(rooms):
         return {"mean": math.nan, "low": math.nan, "high": math.nan, "rooms": 0, "frames": 0}
     found = mean_interval(values, rooms)
     return {
@@ -264,10 +273,10 @@ def _opponent(entries: pd.DataFrame, entry: Any, against: str | None) -> Any:
 def _difference(
     first: np.ndarray, second: np.ndarray, rooms: np.ndarray, metric: Any, floor: float
 ) -> dict[str, Any]:
-    both = np.isfinite(first) & np.isfinite(second)
+    both = np.isfinite(first).all(axis=1) & np.isfinite(second).all(axis=1)
     if not both.any():
         return {}
-    found = paired_difference(first[both], second[both], rooms[both])
+    found = paired_difference(first[both].T, second[both].T, rooms[both])
     return {
         "difference": found.mean,
         "difference_low": found.low,

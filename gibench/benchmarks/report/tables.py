@@ -127,7 +127,7 @@ def errors(summary: Summary, track: str, part: str) -> Table:
     ]
     groups.append((None, [[Cell("noise floor of the reference"), *floors]]))
     caption = (
-        f"{PARTS.get(part, part)}, track {track}: means over all rooms and their 95 % intervals, clustered by room. "
+        f"{PARTS.get(part, part)}, track {track}: means over all rooms and their 95 % intervals over rooms and seeds. "
         "The best of a column is bold. "
     ) + _directions(metrics)
     return Table(caption, ["Method", *map(metric_title, metrics)], groups)
