@@ -44,8 +44,9 @@ class Replay:
 
         held: arrays, or pytrees of them, that it reads besides and that stay as they are.
         """
-        portals = arrays_of(scene.portals) if scene.portals is not None else {}
-        self._held = [scene.mi_scene, portals, scene._tables, scene.layers.arrays, _kinds(), held]
+        self._held = [scene.mi_scene, scene._tables, scene.layers.arrays, _kinds(), held]
+        # Their arrays are others after a change of the light.
+        self._changing = [thing for thing in (scene.portals, scene.lights) if thing is not None]
         self._function = function
         me = weakref.ref(self)  # `dr.freeze` makes cycles of its own, which would hold the scene
 
@@ -65,7 +66,7 @@ class Replay:
     def __call__(self, *arguments: Any) -> Any:
         """Call the function."""
         with tracing():
-            return self._frozen(self._held, arguments)
+            return self._frozen([*self._held, *map(arrays_of, self._changing)], arguments)
 
 
 def arrays_of(thing: Any) -> dict[str, Any]:

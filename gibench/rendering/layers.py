@@ -15,6 +15,7 @@ import mitsuba as mi
 import numpy as np
 
 from gibench.rendering.backend import is_scalar, registry_key
+from gibench.rendering.children import children_of
 
 LEAF, SIDES, NESTED, MASK, BLEND = range(5)
 
@@ -34,24 +35,6 @@ class Part:
 
     bsdf: Any
     weight: Any
-
-
-class _Children(mi.TraversalCallback):
-    """Collects the materials right below a material.
-
-    Not defined where it is used: a class is a reference cycle, and what it held would die whenever Python looks for
-    cycles. Where that is while a kernel is traced, the process is aborted.
-    """
-
-    def __init__(self) -> None:
-        """Nothing is found yet."""
-        super().__init__()
-        self.found: list[Any] = []
-
-    def put(self, name: str, value: Any, flags: Any, cpptype: Any = None) -> None:
-        """Called by Mitsuba for each thing that a material is made of."""
-        if isinstance(value, mi.BSDF):
-            self.found.append(value)
 
 
 class Layers:
@@ -85,9 +68,7 @@ class Layers:
 
     def _look(self, bsdf: Any) -> int:
         """Note the tree below a material; returns its depth."""
-        collector = _Children()
-        bsdf.traverse(collector)
-        children = collector.found
+        children = [child for child in children_of(bsdf) if isinstance(child, mi.BSDF)]
         name = bsdf.class_name()
         if not children:
             self.principled |= name in PRINCIPLED

@@ -40,10 +40,11 @@ class Portals:
         areas = np.linalg.norm(normal, axis=1)
         total = float(areas.sum())
         self._count = mi.UInt32(len(rectangles))
-        self.share = mi.Float(SHARE if len(rectangles) else 0.0)
+        self._any = len(rectangles) > 0
+        self.open(True)
         self._inverse_area = mi.Float(1 / total if total > 0 else 0.0)
         self.environment = mi.EmitterPtr(environment)
-        dr.make_opaque(self._count, self.share, self._inverse_area, self.environment)
+        dr.make_opaque(self._count, self._inverse_area, self.environment)
         # One row a portal: corner, edges, normal, edges over their squared lengths, share of the area up to its end.
         ends = np.cumsum(areas) / max(total, 1e-30)
         rows = [
@@ -58,6 +59,11 @@ class Portals:
         table = np.concatenate(rows, axis=1) if len(rectangles) else np.zeros((1, _COLUMNS))
         self._table = mi.Float(table.astype(np.float32).ravel())
         dr.make_opaque(self._table)
+
+    def open(self, bright: bool) -> None:
+        """Sample through the portals where the environment is bright, and not where it is dark."""
+        self.share = mi.Float(SHARE if bright and self._any else 0.0)
+        dr.make_opaque(self.share)
 
     def _row(self, portal, column):
         offset = portal * _COLUMNS + column

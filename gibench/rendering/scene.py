@@ -30,7 +30,8 @@ class Scene:
     mi_scene: the `mitsuba.Scene`. materials, shapes: names by id; id i is entry i − 1, since id 0 is a miss. The order
     is alphabetical by shape id (a material stands where its first shape does): Mitsuba loads in parallel and lists
     shapes in an order of its own. openings: (N, 3, 3), the rectangles that daylight enters by (corner and two edges
-    whose cross product points inside, metres), or None where nothing is known of them.
+    whose cross product points inside, metres), or None where nothing is known of them. lights: `light_rig.Lights`, what
+    lights it now, or None for a scene that keeps its own light.
     """
 
     mi_scene: Any
@@ -39,6 +40,7 @@ class Scene:
     _material_of: dict[int, int]
     _shape_of: dict[int, int]
     openings: NDArray[np.float64] | None = None
+    lights: Any = None
     _beside: tuple[Any, ...] = ()  # what must live as long as the scene
 
     @cached_property
@@ -110,9 +112,10 @@ def _check(shape: Any) -> None:
             )
 
 
-def wrap(mi_scene: Any) -> Scene:
+def wrap(mi_scene: Any, *, last: str = "") -> Scene:
     """The handle of a `mitsuba.Scene` that already exists, made under the current variant.
 
+    last: id of a shape that is numbered after all others, so that these keep their ids without it.
     Raises SceneError for a mesh without triangles or a light without area.
     """
 
@@ -122,7 +125,7 @@ def wrap(mi_scene: Any) -> Scene:
     material_of: dict[int, int] = {}
     shapes: list[str] = []
     shape_of: dict[int, int] = {}
-    for number, shape in enumerate(sorted(mi_scene.shapes(), key=lambda s: s.id())):
+    for number, shape in enumerate(sorted(mi_scene.shapes(), key=lambda s: (s.id() == last, s.id()))):
         shapes.append(shape.id() or f"shape_{number}")
         shape_of[registry_key("ShapePtr", shape)] = number + 1
         bsdf = shape.bsdf()

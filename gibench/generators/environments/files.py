@@ -13,9 +13,7 @@ from numpy.typing import NDArray
 from gibench.generators.daylight import BadEnvironment, read_panorama
 from gibench.generators.environments.shipped import ShippedMap, shipped_maps
 from gibench.rendering.latlong import resampled
-
-HEIGHT = 128
-"""Rows of a map that frames are lit by: those that ship have as many, and maps of one size share a kernel."""
+from gibench.rendering.panoramas import HEIGHT
 
 SUFFIXES = (".exr", ".hdr")
 
