@@ -27,6 +27,9 @@ RECTANGLE, SKY = "rectangle", "sky"
 HIDDEN = 1e-4
 """Metres: sides of the rectangle while it gives no light."""
 
+DARKEST = 1e-30
+"""Radiance of textures that give no light, W·m⁻²·sr⁻¹: what float16 and every sum with other light make 0."""
+
 _CONSTANT = for_envmap(np.ones((HEIGHT, 2 * HEIGHT, 3)))
 
 
@@ -52,7 +55,7 @@ class Lights:
 
 @dataclass
 class _Lamp:
-    """Light that a scene brings along. dimmers: parameter → value, which are zeros while it is dark."""
+    """Light that a scene brings along. dimmers: parameter → value, for what turns it dark."""
 
     weight: str
     sampling: float
@@ -188,7 +191,7 @@ class LightRig:
         for lamp in self._lamps:
             if self._lit[lamp.weight] != own or self.lighting is None:
                 for name, value in lamp.dimmers.items():
-                    self._put(name, _copy(value) if own else _zeros(value))
+                    self._put(name, _copy(value) if own else _dimmed(name, value))
                 self._lit[lamp.weight] = own
             self._parameters[lamp.weight] = lamp.sampling if own else 0.0
         lit = area or (own and any(lamp.sampling > 0 for lamp in self._lamps))
@@ -210,9 +213,7 @@ class _Sky:
     bright: bool = False
     scale: float = 1.0
     to_world: NDArray[np.float64] = field(default_factory=lambda: np.eye(4))
-    pixels: NDArray[np.float32] = field(
-        default_factory=lambda: np.ones((SIZE[1], SIZE[0] + 2, 3), np.float32)
-    )
+    pixels: NDArray[np.float32] = field(default_factory=lambda: _around(_CONSTANT))
 
     @classmethod
     def of(cls, emitter: Any) -> _Sky:
@@ -259,5 +260,6 @@ def _copy(value: Any) -> Any:
     return type(value)(value)
 
 
-def _zeros(value: Any) -> Any:
-    return value * 0
+def _dimmed(name: str, value: Any) -> Any:
+    # A texture of zeros has no density, and paths that meet it would be lost.
+    return value * 0 + (DARKEST if name.endswith(".data") else 0)

@@ -54,7 +54,9 @@ class Panorama:
             with OpenEXR.File(str(self.source)) as file:
                 pixels = np.ascontiguousarray(file.channels()["RGB"].pixels, dtype=np.float32)
         except Exception as error:  # what OpenEXR raises for a file that is no image differs by its fault
-            raise PanoramaError(f"panorama {self.source}: not readable ({str(error).splitlines()[0]})") from None
+            raise PanoramaError(
+                f"panorama {self.source}: not readable ({str(error).splitlines()[0]})"
+            ) from None
         if digest(pixels) != self.sha256:
             raise PanoramaError(f"panorama {self.source}: its pixels are not those that it was made with")
         pixels.setflags(write=False)
@@ -75,7 +77,9 @@ def _checked(name: str, pixels: NDArray[Any]) -> NDArray[Any]:
         )
     broken = int((~np.isfinite(pixels)).sum() + (pixels < 0).sum())
     if broken:
-        raise PanoramaError(f"panorama {name}: {broken} values are negative or not finite; mend it or use another")
+        raise PanoramaError(
+            f"panorama {name}: {broken} values are negative or not finite; mend it or use another"
+        )
     if not pixels.any():
         raise PanoramaError(f"panorama {name}: it is black; use one that gives light")
     return pixels

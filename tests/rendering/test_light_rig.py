@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from gibench.rendering.camera import PinholeCamera
+from gibench.rendering.latlong import for_envmap
 from gibench.rendering.light_rig import LightRig
 from gibench.rendering.lighting import AreaLight, EnvironmentMap, Lighting, LightingError
-from gibench.rendering.latlong import for_envmap
 from gibench.rendering.render import render_frame
 from gibench.rendering.scene import load_dict
 from tests.rendering.scenes import CAMERA, MATERIALS, area, box, rectangle, rgb
@@ -28,9 +28,7 @@ LIGHTS = (
 )
 SIZE = (256, 128)
 AREA = tuple(Lighting(light) for light in LIGHTS)
-SKIES = tuple(
-    Lighting(environment=EnvironmentMap(panorama(seed, SIZE), 0.4 + seed)) for seed in range(3)
-)
+SKIES = tuple(Lighting(environment=EnvironmentMap(panorama(seed, SIZE), 0.4 + seed)) for seed in range(3))
 
 
 def loaded_with(lighting: Lighting, scene: dict) -> dict:
@@ -155,9 +153,10 @@ def test_moves_and_swaps_compile_no_kernel_and_record_nothing_anew():
         centre, radiance = rng.uniform((-0.8, -0.8, 0.2), (0.8, 0.8, 1.8)), rng.uniform(1, 9, 3)
         return Lighting(AreaLight(centre, rng.normal(size=3), *rng.uniform(0.1, 0.4, 2), radiance))
 
-    for number in (1, 2):
-        rig.set(moved(number))
-    frame()
+    with kernels_compiled():  # recordings are told apart by such settings too
+        for number in (1, 2):
+            rig.set(moved(number))
+            frame()
     with kernels_compiled() as compiled:
         seen = []
         for number in range(51):
