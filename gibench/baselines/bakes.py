@@ -1,24 +1,36 @@
 """Baked files, kept by what they depend on and shared by all methods that ask for the same.
 
-What a bake cost is kept with it, so that a method is charged for a lightmap that another one made first.
+They depend on the sources of their making too: code that is edited bakes anew. What a bake cost is kept with it, so
+that a method is charged for a lightmap that another one made first.
 """
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import os
+import re
 import shutil
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from gibench.baselines.sources import digest, module_of
 from gibench.baselines.stages import synchronise
 from gibench.datasets.files import as_json, sync_tree
+from gibench.datasets.folder import own_leftovers
 
 RECORD = "bake.json"
+
+NAME = r"\.[^/]+-[0-9a-f]{24}"
+"""Pattern of the name of what lies beside a bake while it is made."""
+
+PARTIAL = ".partial-"
+"""Between the name of a half-made bake and the number of the process that makes it."""
 
 
 @dataclass(frozen=True)
@@ -39,55 +51,112 @@ class BakeCache:
     """
 
     def __init__(self, root: Path, scene: str, machine: Mapping[str, Any]) -> None:
-        """root: made when something is baked."""
+        """root: made when something is baked. What killed processes left there goes."""
         self.root, self._scene, self._machine = root, scene, dict(machine)
         self.used: list[Bake] = []
+        remove_abandoned(root)
 
-    def get(self, kind: str, settings: Mapping[str, Any], make: Callable[[Path], float | None]) -> Bake:
+    def get(
+        self,
+        kind: str,
+        settings: Mapping[str, Any],
+        make: Callable[[Path], float | None],
+        *,
+        using: Sequence[Callable[..., Any]] = (),
+    ) -> Bake:
         """The bake of these settings, made by `make(folder)` where it is not there yet.
 
         kind: "lightmap", "probes" …, what its time is booked under. settings: all that decides the content beside
-        the scene, JSON-able; a version number of the code that makes it among them. A half-made bake is never
-        taken for a whole one. make: may return seconds that were spent on it before, in a run that was cut off.
+        the scene and the code, JSON-able. make: may return seconds that were spent on it before, in a run that was cut
+        off; the module that it is written in and all that this imports are part of the key. using: functions that it
+        was given and whose modules count as well. A half-made bake is never taken for a whole one.
         """
-        key, folder = self._place(kind, settings)
+        key = {
+            "kind": kind,
+            "settings": dict(settings),
+            "sources": digest(*(module_of(function) for function in (make, *using))),
+            "scene": self._scene,
+            "machine": self._machine,
+        }
+        name = hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()[:24]
+        folder = self.root / f"{kind}-{name}"
         if not (folder / RECORD).is_file():
-            self._make(folder, key, make)
+            _make(folder, key, make)
         record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
         bake = Bake(kind, folder, record["seconds"], record["bytes"])
         if bake.folder not in [used.folder for used in self.used]:
             self.used.append(bake)
         return bake
 
-    def checkpoint(self, kind: str, settings: Mapping[str, Any]) -> Path:
-        """A file beside the bake of these settings for what its making must not lose when it is killed.
+    @staticmethod
+    def checkpoint(folder: Path) -> Path:
+        """A file for what a making must not lose when it is killed; it goes once the bake is there.
 
-        Whoever writes it removes it once the bake is there.
+        folder: what `make` was called with.
         """
-        _, folder = self._place(kind, settings)
-        return folder.with_name(f".{folder.name}.checkpoint")
+        return folder.with_name(f"{folder.name.partition(PARTIAL)[0]}.checkpoint")
 
-    def _place(self, kind: str, settings: Mapping[str, Any]) -> tuple[dict[str, Any], Path]:
-        key = {"kind": kind, "settings": dict(settings), "scene": self._scene, "machine": self._machine}
-        digest = hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()[:24]
-        return key, self.root / f"{kind}-{digest}"
 
-    def _make(self, folder: Path, key: dict[str, Any], make: Callable[[Path], float | None]) -> None:
-        partial = folder.with_name(f".{folder.name}.partial-{os.getpid()}")
-        shutil.rmtree(partial, ignore_errors=True)
-        partial.mkdir(parents=True)
+def _make(folder: Path, key: dict[str, Any], make: Callable[[Path], float | None]) -> None:
+    with _held(folder.with_name(f".{folder.name}{PARTIAL}{os.getpid()}")) as partial:
+        synchronise()
+        start = time.perf_counter()
+        before = make(partial) or 0.0
+        synchronise()
+        seconds = before + time.perf_counter() - start
+        size = sum(path.stat().st_size for path in partial.rglob("*") if path.is_file())
+        (partial / RECORD).write_bytes(as_json({"key": key, "seconds": seconds, "bytes": size}))
+        sync_tree(partial)
+        if folder.exists() and not (folder / RECORD).is_file():
+            shutil.rmtree(folder)
         try:
-            synchronise()
-            start = time.perf_counter()
-            before = make(partial) or 0.0
-            synchronise()
-            seconds = before + time.perf_counter() - start
-            size = sum(path.stat().st_size for path in partial.rglob("*") if path.is_file())
-            (partial / RECORD).write_bytes(as_json({"key": key, "seconds": seconds, "bytes": size}))
-            sync_tree(partial)
-            if folder.exists():  # without its record, so not whole
-                shutil.rmtree(folder)
             partial.rename(folder)
-        except BaseException:
-            shutil.rmtree(partial, ignore_errors=True)
-            raise
+        except OSError as problem:
+            # Another process has made the same in the meantime, and somebody may be reading it.
+            if problem.errno not in (errno.EEXIST, errno.ENOTEMPTY) or not (folder / RECORD).is_file():
+                raise
+        BakeCache.checkpoint(partial).unlink(missing_ok=True)
+
+
+@contextmanager
+def _held(partial: Path) -> Iterator[Path]:
+    """A new folder that `remove_abandoned` leaves alone while this process lives; gone afterwards."""
+    shutil.rmtree(partial, ignore_errors=True)  # of a process that had the same number
+    while True:
+        partial.mkdir(parents=True, exist_ok=True)
+        descriptor = os.open(partial, os.O_RDONLY)
+        with suppress(OSError):  # some file systems of networks have no locks; there nobody cleans up either
+            _lock(descriptor, wait=True)
+        # Somebody may have taken it for abandoned before it was locked.
+        with suppress(FileNotFoundError):
+            if os.fstat(descriptor).st_ino == partial.stat().st_ino:
+                break
+        os.close(descriptor)
+    try:
+        yield partial
+    finally:
+        shutil.rmtree(partial, ignore_errors=True)
+        os.close(descriptor)
+
+
+def remove_abandoned(root: Path) -> None:
+    """Remove half-made bakes whose process is dead. Those that a living one is making stay, and so do links."""
+    for partial in own_leftovers(root, rf"{NAME}{re.escape(PARTIAL)}[0-9]+"):
+        with suppress(OSError):  # no folder, not ours, gone by now, or held
+            descriptor = os.open(partial, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+            try:
+                _lock(descriptor, wait=False)
+                shutil.rmtree(partial)
+            finally:
+                os.close(descriptor)
+    for beside in own_leftovers(root, rf"{NAME}\.checkpoint\.[0-9]+"):  # checkpoints that were being written
+        stem, process = beside.name.split(".checkpoint.")
+        if not (root / f"{stem}{PARTIAL}{process}").exists():
+            beside.unlink(missing_ok=True)
+
+
+def _lock(descriptor: int, *, wait: bool) -> None:
+    """Lock a folder for as long as the descriptor is open. Raises OSError: held by another, or not possible."""
+    import fcntl  # Unix; imported here so that cards of methods load everywhere
+
+    fcntl.flock(descriptor, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)

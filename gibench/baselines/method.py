@@ -142,7 +142,8 @@ class Site:
     """What a method may prepare from.
 
     scene: loaded under the run's variant. folder: that of the room, with scene.xml and room.json. resolution: (width,
-    height) of the frames to come. training: views of the room that are not scored, which load what they are asked for.
+    height) of the frames to come. training: views of the room that are not scored; whoever is handed
+    one is charged with its rendering.
     seed: all that the method may draw random numbers from. bakes: files that are shared with other methods.
     stages: where preparation is timed.
     """

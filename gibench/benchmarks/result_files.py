@@ -26,6 +26,7 @@ from pydantic import BaseModel
 
 import gibench
 from gibench import gate
+from gibench.baselines.bakes import remove_abandoned
 from gibench.benchmarks import records
 from gibench.benchmarks.errors import ResultsError
 from gibench.datasets.checked import parsed, plain, shown
@@ -139,6 +140,8 @@ class RunFolder:
         for left in own_leftovers(self.results, ID):  # its frames came, its record did not
             if not os.path.lexists(self.result_file(left.name)):
                 _remove_frames(left)
+        for scene in own_leftovers(self.root / "bakes", r"[^/.][^/]*"):
+            remove_abandoned(scene)
         for place in (self.root.resolve(), self.results, self.scores):
             for left in own_leftovers(place, r"\.[^/]+\.json\.partial-[0-9]+"):
                 if not gate.real_folder(left):

@@ -9,15 +9,21 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, overload
 
+from gibench.baselines.booking import Booking
 from gibench.benchmarks.errors import ResultsError
 from gibench.datasets.errors import DatasetError
 from gibench.datasets.exr import decode
-from gibench.datasets.loading import Frame, open_dataset
+from gibench.datasets.loading import Dataset, Frame, open_dataset
 from gibench.datasets.manifest import room_record
+
+if TYPE_CHECKING:
+    from torch import Tensor
+    from torch.utils.data import Dataset as TorchDataset
 
 Vector = tuple[float, float, float]
 
@@ -98,19 +104,56 @@ def _content(root: Path, room: int) -> str:
     return hashlib.sha256(json.dumps(known, sort_keys=True).encode()).hexdigest()
 
 
-class TrainingView(Frame):
-    """A frame that remembers that it was looked at, since whoever reads it pays for its rendering."""
+class TrainingViews(Sequence[Frame]):
+    """The training views of a room. Whoever is handed one is charged with its rendering, whatever process reads it."""
 
-    was_read = False
+    def __init__(self, dataset: Dataset | None) -> None:
+        """dataset: of this room's views alone; None where the run made none."""
+        self._dataset = dataset
+        self._booking = Booking(len(self))
 
-    def read(self, *channels: str) -> dict[str, Any]:
-        """As `Frame.read`."""
-        self.was_read = True
-        return super().read(*channels)
+    def __len__(self) -> int:
+        """Number of views; asking costs nothing."""
+        return len(self._dataset) if self._dataset is not None else 0
+
+    @overload
+    def __getitem__(self, index: int) -> Frame: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Frame]: ...
+    def __getitem__(self, index: int | slice) -> Frame | list[Frame]:
+        """Hand out a view, or some. Raises IndexError."""
+        if isinstance(index, slice):
+            return [self[one] for one in range(*index.indices(len(self)))]
+        if self._dataset is None:
+            raise IndexError(f"view {index} of none")
+        frame = self._dataset[index]
+        self._booking.book(index % len(self))
+        return frame
+
+    def torch(self, channels: Sequence[str]) -> TorchDataset[dict[str, Tensor]]:
+        """Hand out all of them, as `Dataset.torch` does."""
+        if self._dataset is None:
+            raise ResultsError("this method asked for no channels of training views")
+        self._booking.book_all()
+        return self._dataset.torch(channels)
+
+    @property
+    def handed_out(self) -> list[int]:
+        """Numbers of the views that somebody was given."""
+        return self._booking.booked
+
+    @property
+    def seconds(self) -> float:
+        """That rendering these took."""
+        if self._dataset is None:
+            return 0.0
+        return float(sum(self._dataset[index].row["seconds"] for index in self.handed_out))
 
 
-def training_views(root: Path | None, room: int) -> list[TrainingView]:
+def training_views(root: Path | None, room: int) -> TrainingViews:
     """Training views of a room; none where the run made none."""
     if root is None:
-        return []
-    return [TrainingView(frame.path, frame.row) for frame in open_dataset(root) if frame.room == room]
+        return TrainingViews(None)
+    dataset = open_dataset(root)
+    rows = dataset.frames[dataset.frames["room"] == room].reset_index(drop=True)
+    return TrainingViews(Dataset(root, dataset.manifest, rows))

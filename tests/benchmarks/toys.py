@@ -51,10 +51,10 @@ class Constant:
             time.sleep(0.05)
             (folder / "colour.txt").write_bytes(b"x" * 1000)
 
-        site.bakes.get("lightmap", {"style": self.settings.get("style"), "version": 1}, make)
+        site.bakes.get("lightmap", {"style": self.settings.get("style")}, make)
         with site.stages.stage("training"):
             time.sleep(0.02)
-        for frame in list(site.training)[:1]:
+        for frame in site.training[:1]:
             assert frame["color"].shape == (*site.resolution[::-1], 3)
         print("prepared", os.getpid(), file=sys.stderr)
 

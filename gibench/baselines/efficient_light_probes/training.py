@@ -27,11 +27,8 @@ from gibench.baselines.efficient_light_probes import losses
 from gibench.baselines.efficient_light_probes.examples import Example, camera_of
 from gibench.baselines.efficient_light_probes.network import ReconstructionNetwork, Scale
 from gibench.baselines.method import MethodError, Setting, Site
-from gibench.metrics import reference_exposure
 from gibench.metrics.lpips_network import build_network
-
-VERSION = 1
-"""Of what is trained; raise it when the same settings give other weights."""
+from gibench.metrics.tone_map import reference_exposure
 
 BATCH = 2
 """Crops a step: many small steps learn more in the same time than few large ones."""
@@ -103,23 +100,22 @@ def trained_network(
 ) -> Trained:
     """The network of a site, trained where it is not there yet.
 
-    settings: all that decides the examples. Raises MethodError where there are too few training views, WeightsError
-    where the perceptual loss has no weights.
+    settings: what decides the examples, beside the code that makes them. Raises MethodError where there are too few
+    training views, WeightsError where the perceptual loss has no weights.
     """
     # Read even where the network is there: whoever uses it pays for the views that it learned from.
     views = hashlib.sha256()
     for frame in site.training:
         views.update(repr(camera_of(frame)).encode() + frame["color"].tobytes())
     key = {
-        "version": VERSION,
         **settings,
         **asdict(plan),
         "views": views.hexdigest(),
         "torch": torch.__version__,
     }
-    checkpoint = site.bakes.checkpoint("training", key)
 
     def make(folder: Path) -> float:
+        checkpoint = site.bakes.checkpoint(folder)
         training = Training(examples(), plan)
         before = training.resume(checkpoint)
         training.run(checkpoint)
@@ -129,8 +125,7 @@ def trained_network(
         )
         return before
 
-    folder = site.bakes.get("training", key, make).folder
-    checkpoint.unlink(missing_ok=True)
+    folder = site.bakes.get("training", key, make, using=[examples]).folder
     return _read(folder, plan.fusion)
 
 

@@ -22,9 +22,6 @@ from gibench.rendering.backend import is_scalar
 from gibench.rendering.render import MAX_DEPTH
 from gibench.rendering.scene import Scene
 
-VERSION = 3
-"""Of what is baked; raise it when the texels change."""
-
 SEED = 0
 """The lightmap is part of the scene to all methods and seeds."""
 
@@ -91,7 +88,6 @@ def baked_lightmap(site: Site, settings: Mapping[str, Setting]) -> Lightmap:
     settings: a method's, with the knobs of `knobs.LIGHTMAP_KNOBS`. Raises LightmapError, DenoiserError.
     """
     chosen: dict[str, Any] = {
-        "version": VERSION,
         "texels_per_metre": settings["texels"],
         "spp": settings["lightmap_spp"],
         "denoise": settings["lightmap_denoise"],

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 from gibench.baselines.method import Setting, Site
 from gibench.baselines.probes import placement
-from gibench.baselines.probes.adaptive import parameterization
 from gibench.baselines.probes.adaptive.parameterization import CELLS, GUIDE_MAPS, GUIDES, parameterize
 from gibench.baselines.probes.adaptive.warp import Warp
 from gibench.baselines.probes.errors import ProbeError
@@ -35,9 +34,6 @@ from gibench.rendering.integrator import scatter_paths
 from gibench.rendering.render import MAX_DEPTH
 from gibench.rendering.sampling import IndependentSampler
 from gibench.rendering.scene import Scene
-
-VERSION = 1
-"""Of this code: maps with other values are another bake."""
 
 LANES = 1 << 22
 """Paths in flight at once, so that memory does not grow with the probes."""
@@ -332,12 +328,7 @@ def baked_files(site: Site, settings: ProbeSettings, maps: tuple[str, ...]) -> d
 
     maps: names in MAPS. Raises ProbeError, DenoiserError.
     """
-    placed = {
-        "version": VERSION,
-        "placement": placement.VERSION,
-        "part": POSITIONS,
-        "probes": settings.count,
-    }
+    placed = {"part": POSITIONS, "probes": settings.count}
 
     def make_positions(folder: Path) -> None:
         np.save(folder / "positions.npy", placement.place(site.scene, settings.count))
@@ -351,7 +342,6 @@ def baked_files(site: Site, settings: ProbeSettings, maps: tuple[str, ...]) -> d
         "height": settings.height,
     }
     if settings.mapping == ADAPTIVE:
-        mapped["parameterization"] = parameterization.VERSION
 
         def make_parameterization(folder: Path) -> None:
             _bake_parameterization(site.scene, np.load(where), (settings.width, settings.height), folder)

@@ -17,9 +17,6 @@ from gibench.baselines.probes.errors import ProbeError
 from gibench.rendering.free_space import NoFreeSpace, enclosed, free_space, seen_from, surroundings
 from gibench.rendering.scene import Scene
 
-VERSION = 1
-"""Of this code: probes that stand elsewhere are another bake."""
-
 CLEARANCE = 0.1
 """Of the grid's step, to the nearest thing that the rays around a probe find."""
 

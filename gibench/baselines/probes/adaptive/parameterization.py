@@ -11,9 +11,6 @@ from gibench.baselines.probes.adaptive.inversion import inverse_map, lattice
 from gibench.baselines.probes.adaptive.quasi_harmonic import forward_map
 from gibench.baselines.probes.adaptive.resolution import resolution_map
 
-VERSION = 1
-"""Of this folder: maps that look elsewhere are another bake."""
-
 GUIDES = (256, 128)
 """Width and height of the maps that decide, section 4.2.1."""
 
