@@ -81,7 +81,7 @@ class RoomChecker:
         seconds = time.perf_counter() - started
         measured = None if self.has_measured else self._measured(built)
         self.has_measured = True
-        frames = len(self.recipe.rendered_views(given_cameras(self.recipe, room)))
+        frames = len(self.recipe.rendered_views(given_cameras(self.recipe, room), room))
         return {
             "frames": frames,
             "rejections": dict(built.rejections),

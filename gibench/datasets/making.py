@@ -137,7 +137,9 @@ class _Run:
             self.manifest = manifests.read_manifest(root)
             manifests.refuse_other(root, self.manifest, recipe)
         whole = folder.whole_rooms(root)
-        frames = [len(recipe.rendered_views(given_cameras(recipe, room))) for room in range(recipe.rooms)]
+        frames = [
+            len(recipe.rendered_views(given_cameras(recipe, room), room)) for room in range(recipe.rooms)
+        ]
         frames_before = sum(frames[room] for room in whole if room < len(frames))
         self.frames_of: Counter[int] = Counter()
         self.progress = Progress(

@@ -92,6 +92,17 @@ class Recipe(BaseModel):
         le=9999,
         description="an integer from 0 to 9999 (frames on the path beside the views, which are then stills)",
     )
+    path_rooms: int | None = Field(
+        None,
+        ge=0,
+        description="an integer from 0 (rooms, the first ones, whose path is rendered; all without it)",
+    )
+    held_out: int = Field(
+        0,
+        ge=0,
+        le=9999,
+        description="an integer from 0 to 9999 (of the stills, the last ones, which are rendered with the path)",
+    )
     rendered: Literal["all", "stills", "path"] = Field(
         "all", description='"all", "stills" or "path" (which of the frames of a room are rendered)'
     )
@@ -141,10 +152,13 @@ class Recipe(BaseModel):
     def _frames_that_can_be(self) -> Self:
         if self.path_views and self.path == "stills":
             raise PydanticCustomError("path", "path_views needs a path: set path to walk, orbit or eight")
-        if self.rendered != "all" and not self.path_views:
+        if self.rendered != "all" and not (self.path_views or self.held_out):
             raise PydanticCustomError(
-                "rendered", f'rendered is "{self.rendered}", but only rooms with path_views have both kinds'
+                "rendered",
+                f'rendered is "{self.rendered}", but only rooms with path_views or held_out have both kinds',
             )
+        if self.held_out > self.views:
+            raise PydanticCustomError("held_out", f"held_out is {self.held_out} of {self.views} views")
         return self
 
     @model_validator(mode="after")
@@ -166,15 +180,17 @@ class Recipe(BaseModel):
             )
         return self
 
-    def rendered_views(self, given: int = 0) -> range:
+    def rendered_views(self, given: int = 0, room: int = 0) -> range:
         """Numbers of the views of a room that are rendered.
 
         First come the cameras that it brings along, `given` of them, which count as stills; then the stills, then those
-        on the path beside them.
+        on the path beside them. Of the stills the last `held_out` go with the path.
         """
         stills = given + self.views
-        first = stills if self.rendered == "path" else 0
-        return range(first, stills if self.rendered == "stills" else stills + self.path_views)
+        apart = stills - self.held_out
+        has_path = self.path_rooms is None or room < self.path_rooms
+        last = stills + (self.path_views if has_path else 0)
+        return range(apart if self.rendered == "path" else 0, apart if self.rendered == "stills" else last)
 
     @field_validator("kinds")
     @classmethod
@@ -212,7 +228,13 @@ class Recipe(BaseModel):
         values = self.model_dump(mode="json", exclude={"rooms"})
         # Datasets that were begun before these keys existed hold the same frames.
         if not self.path_views:
-            del values["path_views"], values["rendered"]
+            del values["path_views"]
+        if not (self.path_views or self.held_out):
+            del values["rendered"]
+        if not self.held_out:
+            del values["held_out"]
+        if self.path_rooms is None:
+            del values["path_rooms"]
         if not self.sample_seed:
             del values["sample_seed"]
         if self.environment not in ENVIRONMENTS:

@@ -218,7 +218,7 @@ class RoomMaker:
         # Compressing and writing a frame goes on while the next one renders. One frame at most waits for it,
         # so memory does not grow with the number of views.
         with ThreadPoolExecutor(max_workers=1) as writer:
-            for view in recipe.rendered_views(given):
+            for view in recipe.rendered_views(given, number):
                 rendered = rendered_frame(recipe, scene, room, view)
                 report("frame", {"paths": rendered.paths, "seconds": rendered.kernel_seconds})
                 if frames:

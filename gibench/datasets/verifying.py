@@ -85,7 +85,9 @@ def _room_problems(root: Path, record: Mapping[str, Any], recipe: Recipe, room: 
         if problem:
             yield Problem(f"{name}/{file}", problem)
     views = [frame["view"] for frame in record["frames"]]
-    asked = recipe.rendered_views(record.get("given_cameras", 0))  # older records have no scenes
+    asked = recipe.rendered_views(
+        record.get("given_cameras", 0), record["room"]
+    )  # older records have no scenes
     if views != list(asked):
         yield Problem(
             f"{name}/frames.json", f"{len(views)} frames are recorded, the recipe has {len(asked)} views"

@@ -22,7 +22,11 @@ from gibench.generators.visibility import Caster
 HEIGHTS = (1.2, 1.8)  # of the camera above the floor, m
 FOV = (math.radians(50), math.radians(90))  # horizontal field of view
 BATCH = 24  # candidates judged at once
-STILL_BATCHES = 12  # batches before a room is given up
+STILL_BATCHES = 12  # batches before a room is given up, at least
+PICKED = (
+    24  # stills up to which the richest that differ most are picked; of more, every one that passes is taken
+)
+TRIED_PER_STILL = 8  # candidates for each of many stills before a room is given up
 PATH_TRIES = 40  # curves before a room is given up
 SHARPEST_BEND = 0.3  # turn of a walk within a sixtieth of its length, radians
 PATHS = ("walk", "orbit", "eight")
@@ -77,17 +81,21 @@ class Stage:
 def sample_stills(
     rng: np.random.Generator, stage: Stage, count: int
 ) -> tuple[tuple[Camera, ...], Counter[str]]:
-    """Draw `count` single views that differ from each other.
+    """Draw `count` single views: few that differ from each other, or many as they come.
 
     Returns them and how often candidates were refused, by reason. Raises NoView when the tries run out.
     """
     chosen: list[Camera] = []
     refused: Counter[str] = Counter()
-    for _ in range(STILL_BATCHES):
+    picked = count <= PICKED
+    for _ in range(max(STILL_BATCHES, math.ceil(TRIED_PER_STILL * count / BATCH))):
         candidates = [_candidate(rng, stage, xy) for xy in stage.points(rng, BATCH)]
         views = stage.judge(candidates)
         refused.update(v.reason for v in views if v.reason)
         passed = [v for v in views if not v.reason]
+        if not picked:
+            chosen += [v.camera for v in passed[: count - len(chosen)]]
+            passed = []
         # Rich views that show what the others do not, so that a handful of frames tells what the room has.
         while passed and len(chosen) < count:
             worth = [v.objects + 6.0 * _difference(v.camera, chosen) for v in passed]

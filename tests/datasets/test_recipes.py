@@ -124,9 +124,28 @@ def test_a_path_beside_stills():
         RecipeError, match="recipe: path_views needs a path: set path to walk, orbit or eight"
     ):
         check_recipe({"path_views": 2})
-    with pytest.raises(RecipeError, match='rendered is "path", but only rooms with path_views have both'):
+    with pytest.raises(RecipeError, match='rendered is "path", but only rooms with path_views or held_out'):
         check_recipe({"path": "walk", "rendered": "path"})
 
 
 def test_datasets_begun_before_there_were_paths_beside_stills_can_be_continued():
     assert not {"path_views", "rendered"} & Recipe(path="walk").identity().keys()
+
+
+def test_stills_that_are_held_out_go_with_the_path():
+    def views(**keys) -> list[int]:
+        room = keys.pop("room", 0)
+        return list(check_recipe({"views": 5, "held_out": 2, **keys}).rendered_views(room=room))
+
+    assert views(rendered="stills") == [0, 1, 2]
+    assert views(rendered="path") == [3, 4]
+    path = {"path": "walk", "path_views": 3, "path_rooms": 1}
+    assert views(rendered="path", **path) == [3, 4, 5, 6, 7]
+    assert views(rendered="path", room=1, **path) == [3, 4]
+    assert views(**path) == list(range(8))
+    with pytest.raises(RecipeError, match="held_out is 6 of 5 views"):
+        views(held_out=6)
+
+
+def test_recipes_without_held_out_stills_are_what_they_were():
+    assert not {"held_out", "path_rooms", "rendered"} & check_recipe({"views": 5}).identity().keys()

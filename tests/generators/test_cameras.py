@@ -16,6 +16,7 @@ from gibench.generators.cameras import (
     sample_stills,
 )
 from gibench.generators.grid_solid import box
+from gibench.generators.rooms import sample_room
 from gibench.generators.view_checks import judge
 from gibench.generators.visibility import RayCaster
 
@@ -111,3 +112,9 @@ def test_camera_at_looks_along_yaw_and_pitch():
     camera = camera_at((1.0, 2.0, 1.5), math.pi / 2, -0.3, 1.0)
     look = np.subtract(camera.target, camera.position)
     np.testing.assert_allclose(look / np.linalg.norm(look), [0, math.cos(0.3), -math.sin(0.3)], atol=1e-12)
+
+
+def test_hundreds_of_stills_are_taken_as_they_pass():
+    room = sample_room(4, 0, kinds=("living",), views=200)
+    assert len(room.cameras) == 200
+    assert len({camera.position for camera in room.cameras}) == 200
