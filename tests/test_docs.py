@@ -259,6 +259,15 @@ def test_links_and_pictures_exist(path):
     assert missing == []
 
 
+def test_results_are_a_page_its_figures_and_the_leaderboards():
+    """All else of a board is packed by `gibench bench report --archive`: it would fill the repository."""
+    folder = ROOT / "docs/results"
+    files = [path for path in folder.rglob("*") if path.is_file()]
+    assert sum(path.stat().st_size for path in files) <= 3_000_000
+    shown = {(folder / target).resolve() for target in re.findall(r"\]\(([^)#\s]+)", page("results/README"))}
+    assert {path.resolve() for path in files} - shown == {(folder / "README.md").resolve()}
+
+
 def test_the_table_of_options_is_that_of_the_help(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "120")
     assert run(make_app, ["--help"]) == 0

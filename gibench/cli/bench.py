@@ -13,7 +13,6 @@ from gibench.errors import GibenchError
 
 if TYPE_CHECKING:
     from gibench.benchmarks.registry import Found
-    from gibench.benchmarks.results import Results
 
 app = typer.Typer(
     help="Run, score and compare methods of real-time global illumination.", no_args_is_help=True
@@ -211,19 +210,22 @@ def compare(
 
 @app.command("report")
 def report(
-    results: Folder,
-    out: Annotated[Path, typer.Option(help="Where to.", show_default=False)],
+    results: Annotated[
+        Path,
+        typer.Argument(
+            metavar="RESULTS", help="The folder of a run, or a packed report.", show_default=False
+        ),
+    ],
+    out: Annotated[Path | None, typer.Option(help="Where to.", show_default=False)] = None,
+    archive: Annotated[
+        Path | None,
+        typer.Option(help="Pack page, images, plots and tables into this ZIP file.", show_default=False),
+    ] = None,
 ) -> None:
-    """Write the leaderboard page, CSV files, tables and plots of a run."""
-    from gibench.benchmarks.report import write_report
-    from gibench.benchmarks.results import load
+    """Write the leaderboard page, CSV files, tables and plots of a run, or unpack those that were packed."""
+    from gibench.cli.bench_reporting import write_and_tell
 
-    loaded: Results = load(results)
-    try:
-        write_report(loaded, out)
-    except OSError as problem:
-        raise GibenchError(f"{problem.filename or out} cannot be written: {problem.strerror}") from None
-    typer.echo(str(out / "index.html"))
+    write_and_tell(results, out, archive)
 
 
 def _methods(names: str | None, track: str, plans: dict[str, Any]) -> list[Found]:

@@ -103,6 +103,19 @@ def test_what_is_no_folder_of_results(capsys, tmp_path, command):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_report_in_one_file_and_out_of_it(capsys, tmp_path, results):
+    packed, site = tmp_path / "board.zip", tmp_path / "site"
+    assert run(app, ["bench", "report", str(results.root), "--archive", str(packed)]) == 0
+    assert capsys.readouterr().out == f"{packed}\n"
+    assert run(app, ["bench", "report", str(packed), "--out", str(site)]) == 0
+    assert capsys.readouterr().out == f"{site / 'index.html'}\n"
+    assert (site / "leaderboard.csv").is_file()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["board.zip", "site"]
+    assert "site exists: choose a new folder" in refused(capsys, "report", packed, "--out", site, code=1)
+    assert "is a packed report: name a new folder" in refused(capsys, "report", packed)
+    assert "name a folder with --out, or a file with --archive" in refused(capsys, "report", results.root)
+
+
 def test_list_says_what_there_is(capsys):
     assert run(app, ["bench", "list"]) == 0
     said = capsys.readouterr()

@@ -1,0 +1,46 @@
+"""What `gibench bench report` does: a report into a folder, into one file, or out of one."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import typer
+
+from gibench.errors import GibenchError
+
+
+def write_and_tell(results: Path, out: Path | None, archive: Path | None) -> None:
+    """Write what was asked for and say where it is.
+
+    results: a run, or a file that `archive` made. out: a folder for the page. archive: a file to pack it into. Raises
+    TrackError for options that contradict each other, ReportError, ResultsError, or GibenchError where the disk
+    refuses.
+    """
+    from gibench.benchmarks.errors import TrackError
+    from gibench.benchmarks.report import write_report
+    from gibench.benchmarks.report.archive import pack, unpack
+    from gibench.benchmarks.results import load
+
+    try:
+        if results.is_file():
+            if out is None or archive is not None:
+                raise TrackError(
+                    f"{results} is a packed report: name a new folder for it with --out, and no --archive"
+                )
+            typer.echo(str(unpack(results, out)))
+            return
+        if out is None and archive is None:
+            raise TrackError("name a folder with --out, or a file with --archive, or both")
+        loaded = load(results)
+        if out is not None:
+            write_report(loaded, out)
+            typer.echo(str(out / "index.html"))
+        if archive is not None:
+            with tempfile.TemporaryDirectory() as scratch:
+                if out is None:
+                    write_report(loaded, Path(scratch) / "report")
+                typer.echo(str(pack(out or Path(scratch) / "report", archive)))
+    except OSError as problem:
+        where = problem.filename or out or archive
+        raise GibenchError(f"{where} cannot be written: {problem.strerror}") from None
