@@ -66,18 +66,16 @@ class PinholeCamera:
         """In pixels."""
         return 0.5 * width / float(np.tan(0.5 * self.fov))
 
-    def project(self, points: Any, resolution: tuple[int, int]) -> tuple[Any, Any, Any]:
-        """Pixel coordinates (x, y) and depth of world points.
+    def project(
+        self, points: NDArray[np.floating], resolution: tuple[int, int]
+    ) -> tuple[NDArray[np.floating], NDArray[np.floating], NDArray[np.floating]]:
+        """Pixel coordinates (x, y) and depth of world points (…, 3); inside of kernels: `RayGenerator.project`.
 
-        points: a Mitsuba point array, or an (…, 3) NumPy array. The centre of the first pixel is (0.5, 0.5). Where
-        the depth is not positive, x and y mean nothing.
+        The centre of the first pixel is (0.5, 0.5). Where the depth is not positive, x and y mean nothing.
         """
         width, height = resolution
-        numpy = isinstance(points, np.ndarray)
-        axes, focal = self.frame, self.focal_length(width)
-        parts = np.moveaxis(points, -1, 0) if numpy else (points.x, points.y, points.z)
-        offset = [p - float(c) for p, c in zip(parts, self.position, strict=True)]
-        x, y, depth = (sum(float(a) * o for a, o in zip(axis, offset, strict=True)) for axis in axes)
+        focal = self.focal_length(width)
+        x, y, depth = np.moveaxis((points - np.array(self.position)) @ self.frame.T, -1, 0)
         return x / depth * focal + 0.5 * width, y / depth * focal + 0.5 * height, depth
 
 

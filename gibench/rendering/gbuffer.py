@@ -81,14 +81,14 @@ def _motion(
     """Offset (pixels) to where the earlier camera saw the point, and whether it did see it there."""
     if previous is None:
         return mi.Vector2f(dr.zeros(mi.Float, dr.width(pixel))), dr.zeros(mi.Float, dr.width(pixel))
-    width, height = resolution
-    x, y, depth = previous.project(hit.si.p, resolution)
+    generator = RayGenerator(previous, resolution)
+    film, depth = generator.project(hit.si.p)
     ahead = hit.valid & (depth > 0)
-    offset = mi.Vector2f(x, y) - pixel
+    offset = mi.Vector2f(film - pixel)
     ahead &= dr.all(dr.isfinite(offset))
     offset = dr.select(ahead, offset, 0)
-    inside = ahead & (x >= 0) & (x < width) & (y >= 0) & (y < height)
-    origin = mi.Point3f(list(previous.position))
+    inside = ahead & dr.all((film >= 0) & (film < 2 * generator.centre))
+    origin = generator.origin
     towards = hit.si.p - origin
     distance = dr.norm(towards)
     ray = mi.Ray3f(origin, towards / distance)
@@ -161,8 +161,9 @@ def render_gbuffer(
         columns = {name: np.array([p[name] for p in pixels]) for name in wanted}
     else:
         index = dr.arange(mi.UInt32, width * height)
-        row = index // dr.opaque(mi.UInt32, width)
-        result = values(mi.Point2f(mi.Float(index - row * width) + 0.5, mi.Float(row) + 0.5))
+        across = dr.opaque(mi.UInt32, width)  # one kernel for all sizes
+        row = index // across
+        result = values(mi.Point2f(mi.Float(index - row * across) + 0.5, mi.Float(row) + 0.5))
         dr.eval(result)
         columns = {name: np.stack([np.array(c) for c in parts], axis=-1) for name, parts in result.items()}
     return {

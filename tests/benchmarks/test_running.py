@@ -319,7 +319,9 @@ def test_predictions_of_a_frame_do_not_depend_on_the_warmup(results):
 
 
 def test_leftovers_of_killed_runs_go(copy):
-    (copy.results / ".0123.partial").mkdir()
+    (copy.results / ".0123456789abcdef.partial").mkdir()
+    bakes = copy.bakes("room-000000")
+    (bakes / f".probes-{24 * 'a'}.partial-1").mkdir()
     (copy.results / "0123456789abcdef").mkdir()
     (copy.scores / ".a.json.partial-1").touch()
     with copy.claimed():
