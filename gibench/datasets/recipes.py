@@ -195,13 +195,15 @@ class Recipe(BaseModel):
     @field_validator("kinds")
     @classmethod
     def _known_kinds(cls, kinds: tuple[str, ...]) -> tuple[str, ...]:
-        from gibench.generators.rooms import KINDS  # not needed by those who only read datasets
+        # Not needed by those who only read datasets.
+        from gibench.generators.rooms import ALL_KINDS, KINDS
 
         for kind in kinds:
-            if kind not in (*KINDS, "all"):
-                text = f"no kind '{kind}'; {nearest(kind, KINDS)}"
+            if kind not in (*ALL_KINDS, "all"):
+                text = f"no kind '{kind}'; {nearest(kind, ALL_KINDS)}"
                 raise PydanticCustomError("unknown", "{text}", {"text": text})
-        return tuple(kind for kind in KINDS if kind in kinds or "all" in kinds)
+        asked = {*kinds, *(KINDS if "all" in kinds else ())}
+        return tuple(kind for kind in ALL_KINDS if kind in asked)
 
     @field_validator("channels")
     @classmethod

@@ -23,9 +23,11 @@ from gibench.generators.parts import Environment, FloatArray, Mesh, Part, Room, 
 from gibench.generators.poses import stand
 from gibench.generators.shapes import merge
 from gibench.generators.shell_sampling import sample_shell
+from gibench.generators.still_life import scene as still_life
 from gibench.generators.visibility import RayCaster, Surface
 
 KINDS = tuple(FURNISH)
+ALL_KINDS = (*KINDS, still_life.KIND)  # with those that are no rooms, which must be asked for
 # A lane is known by its place here: new ones go to the end, or every room of every seed changes.
 LANES = ("kind", "shell", "layout", "materials", "lights", "cameras", "environment", "path")
 TRIES = 12  # of one room before it is given up
@@ -65,9 +67,9 @@ def sample_room(
 ) -> Room:
     """Draw room number `index` of the run `seed`; it depends on these two and on the options alone.
 
-    kind: of the room; drawn from `kinds` if None. views: number of cameras. path: None for stills, or "walk",
-    "orbit" or "eight" for one path of that many frames. path_views: cameras on the path in a room that has stills
-    too: above 0 the `views` are stills, as without a path, and these come after them. environment: what lies
+    kind: of the room, one of ALL_KINDS; drawn from `kinds` if None. views: number of cameras. path: None for stills, or
+    "walk", "orbit" or "eight" for one path of that many frames. path_views: cameras on the path in a room that has
+    stills too: above 0 the `views` are stills, as without a path, and these come after them. environment: what lies
     outside: "none", "sunsky", the path of an HDR panorama, or an Environment; drawn if None.
     fixed: arguments of `build_shell` that are not drawn, such as width=4.0.
 
@@ -75,8 +77,8 @@ def sample_room(
     tries have failed, UnknownKind for a kind or path that does not exist.
     """
     for name in kinds if kind is None else (kind,):
-        if name not in FURNISH:
-            raise UnknownKind(f"there is no room kind {name!r}; choose from {', '.join(KINDS)}")
+        if name not in ALL_KINDS:
+            raise UnknownKind(f"there is no room kind {name!r}; choose from {', '.join(ALL_KINDS)}")
     if path is not None and path not in PATHS:
         raise UnknownKind(f"there is no camera path {path!r}; choose from {', '.join(PATHS)}")
     if path_views and path is None:
@@ -126,6 +128,17 @@ def _try_room(
     def lane(name: str) -> np.random.Generator:
         return _lane(seed, index, name, attempt)
 
+    if kind == still_life.KIND:
+        return still_life.build_still_life(
+            seed,
+            index,
+            attempt,
+            lane,
+            views=views,
+            path=path,
+            path_views=path_views,
+            environment=environment,
+        )
     shell = sample_shell(lane("shell"), kind, **fixed)
     plan = Plan(shell, kind, lane("layout"))
     FURNISH[kind](plan)

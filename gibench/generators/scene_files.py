@@ -21,7 +21,7 @@ from gibench.generators.light_shapes import LAMP_MATERIAL, light_matrix
 from gibench.generators.materials import bsdf_xml, tile_size
 from gibench.generators.outside import GROUND, ground_element
 from gibench.generators.panorama import write_panorama
-from gibench.generators.parts import Camera, Light, Mesh, Room, Texture
+from gibench.generators.parts import Camera, Environment, Light, Mesh, Room, Texture
 from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.scene import OPENINGS
 
@@ -195,7 +195,7 @@ def describe(room: Room) -> dict[str, Any]:
             }
             for light in room.lights
         ],
-        "environment": {"kind": room.environment.kind, "parameters": _plain(room.environment.parameters)},
+        "environment": {"kind": room.environment.kind, "parameters": _outside(room.environment)},
         "materials": {
             name: {
                 "family": material.family,
@@ -210,6 +210,12 @@ def describe(room: Room) -> dict[str, Any]:
         "cameras": camera_records(room.cameras),
         "rejections": dict(sorted(room.rejections.items())),
     }
+
+
+def _outside(environment: Environment) -> Any:
+    """Its parameters, a panorama by its name alone: where it lay on this machine is nobody's concern."""
+    values = _plain(environment.parameters)
+    return {**values, "path": Path(values["path"]).name} if "path" in values else values
 
 
 def camera_records(cameras: Sequence[Camera]) -> list[dict[str, Any]]:
