@@ -26,9 +26,13 @@ from gibench.stress.registry import all_cases
 from gibench.stress.running import Report
 from tests.generators import test_furniture as furniture_tests
 from tests.generators.materials import test_families as material_tests
+from tests.test_house import MAY_IMPORT
 
 ROOT = Path(__file__).parent.parent
-PAGES = [ROOT / "README.md", ROOT / "docs/results/README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [
+    *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "SECURITY.md", "docs/results/README.md")),
+    *sorted((ROOT / "docs").glob("*.md")),
+]
 PROGRAMS = {"gibench": "main", "make-dataset": "make_dataset"}
 
 pytestmark = pytest.mark.skipif(not (ROOT / "docs").is_dir(), reason="tests run away from the documentation")
@@ -257,6 +261,15 @@ def test_links_and_pictures_exist(path):
     targets = re.findall(r"\]\(([^)#\s]+)[^)]*\)", path.read_text("utf-8"))
     missing = [t for t in targets if "://" not in t and not (path.parent / t).exists()]
     assert missing == []
+
+
+def test_contributors_are_told_what_holds_the_house_together():
+    """The table of who may import whom is the one that is enforced."""
+    table = page("contributing").split("| folder of `gibench/` |")[1].split("\n\n")[0].splitlines()[2:]
+    listed = {line.split("|")[1].strip(" `"): line.split("|")[3] for line in table}
+    assert set(listed) == set(MAY_IMPORT)
+    for room in ("rendering", "generators", "baselines"):
+        assert set(re.findall(r"`(\w+)`", listed[room])) == MAY_IMPORT[room]
 
 
 def test_results_are_a_page_its_figures_and_the_leaderboards():

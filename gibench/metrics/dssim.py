@@ -35,13 +35,15 @@ def dssim(
     Args:
         pred: display values in [0, data_range], (H, W, 3) or (N, H, W, 3); see `gibench.metrics.tone_map`.
         ref: the reference, of the same shape; at least 11×11 pixels.
-        data_range, map, mask: see `ssim`.
+        data_range: the largest value that a display value can have.
+        map: give each pixel's dissimilarity in place of the mean.
+        mask: booleans (H, W) or (N, H, W), True where a pixel counts.
 
     Returns:
         A float, or (N,) for a batch, in [0, 1]; with `map` (H, W) or (N, H, W), NaN outside the mask.
 
     Raises:
-        What `ssim` does.
+        DtypeError, ShapeError, NonFiniteError, RangeError, ImageTooSmallError: as `ssim` does.
 
     References:
         Loza, Mihaylova, Canagarajah & Bull 2006, Structural similarity-based object tracking in video
