@@ -11,6 +11,9 @@ import errno
 import os
 import re
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
+from io import BufferedReader
 from pathlib import Path
 
 from gibench.errors import GibenchError
@@ -65,23 +68,28 @@ def read_inside(root: Path, name: str | os.PathLike[str], limit: int = LARGEST_T
 
 def read_regular(path: Path, limit: int = LARGEST_TEXT) -> bytes:
     """Read a file that is regular and holds at most `limit` bytes; never waits at a pipe. Raises `GateError`."""
+    with opened(path) as file:
+        size = os.fstat(file.fileno()).st_size
+        if size > limit:
+            raise GateError(f"{path} holds {size} bytes, more than the {limit} that are read")
+        return file.read(limit)
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[BufferedReader]:
+    """Open a regular file for reading; never waits at a pipe. Raises `GateError`, also while it is read."""
     try:
         # A pipe without a writer would be waited for.
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
         with open(descriptor, "rb") as file:
-            status = os.fstat(descriptor)
-            if not stat.S_ISREG(status.st_mode):
+            if not stat.S_ISREG(os.fstat(descriptor).st_mode):
                 raise GateError(f"{path} is no regular file")
-            if status.st_size > limit:
-                raise GateError(f"{path} holds {status.st_size} bytes, more than the {limit} that are read")
-            return file.read(limit)
+            yield file
     except OSError as problem:
         raise GateError(
             f"{path} cannot be read: {problem.strerror}",
             missing=problem.errno in (errno.ENOENT, errno.ENOTDIR),
         ) from None
-    except ValueError:
-        raise GateError(f"{str(path)!r} is no name of a file") from None
 
 
 def real_folder(path: Path) -> bool:

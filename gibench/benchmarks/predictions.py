@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gibench import gate
 from gibench.baselines.method import MethodError, Prediction
 from gibench.benchmarks.errors import ResultsError
 from gibench.datasets.exr import dark_radiance, fits_half
+from gibench.datasets.exr_header import read_header
 
 Image = NDArray[np.float32]
 
@@ -76,12 +80,21 @@ def encode(parts: dict[str, Image]) -> bytes:
     return content.getvalue()
 
 
-def read(path: Path) -> dict[str, Image]:
-    """The parts that a file holds, (H, W, 3) float32 by part. Raises ResultsError for a damaged file."""
+def read(root: Path, id: str, frame: int, known: Mapping[str, Any]) -> dict[str, Image]:
+    """The parts that a result says a frame has, (H, W, 3) float32 by part.
+
+    root: folder of the run. known: the fingerprint that the frame was written with. Raises ResultsError for a file that
+    is damaged, was changed since, or is none.
+    """
     import OpenEXR
 
+    name = f"results/{id}/{frame:04d}.exr"
     try:
-        with OpenEXR.File(str(path), separate_channels=True) as opened:
+        content = gate.read_inside(root, name, limit=int(known["bytes"]))
+        if len(content) != known["bytes"] or hashlib.sha256(content).hexdigest() != known["sha256"]:
+            raise ValueError("it was changed after the run: its SHA-256 differs")
+        read_header(content)
+        with OpenEXR.File(io.BytesIO(content), separate_channels=True) as opened:
             layers = {name: layer.pixels for name, layer in opened.channels().items()}
         return {
             part: np.stack([layers[name] for name in names], axis=-1).astype(np.float32)
@@ -90,7 +103,5 @@ def read(path: Path) -> dict[str, Image]:
         }
     except Exception as problem:  # OpenEXR raises whatever its C++ side threw
         reason = " ".join(str(problem).split())
-        raise ResultsError(
-            f"{path} cannot be read ({reason}): remove {path.parent.with_suffix('.json')} and run the same command "
-            "again"
-        ) from None
+        remedy = f"remove {root / 'results' / id}.json and run the same command again"
+        raise ResultsError(f"{root / name} cannot be read ({reason}): {remedy}") from None

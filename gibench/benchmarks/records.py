@@ -6,13 +6,20 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
+from gibench.benchmarks.predictions import LAYERS
 from gibench.datasets.checked import Amount, Checked, Count, Fingerprint, Name, Sha256, shown
 from gibench.datasets.errors import nearest
 from gibench.metrics import METRICS
 
-Part = Literal["full", "specular"]
+Text = Annotated[str, Field(max_length=4000)]
 Setting = bool | int | float | str
 Id = Annotated[str, Field(pattern=r"^[0-9a-f]{16}$")]
+
+
+def _part(name: str) -> str:
+    if name not in LAYERS:
+        raise ValueError(f"there is no part {shown(name)}; {nearest(name, LAYERS)}")
+    return name
 
 
 def _metric(name: str) -> str:
@@ -24,6 +31,9 @@ def _metric(name: str) -> str:
 def _metric_or_side(name: str) -> str:
     return _metric(name.removesuffix("_prediction").removesuffix("_reference")) and name
 
+
+Part = Annotated[str, AfterValidator(_part)]
+"""What is scored of an image: "full", "specular" …"""
 
 Metric = Annotated[str, AfterValidator(_metric)]
 """A metric that there is: it becomes part of a file's name, and is looked up."""
@@ -96,7 +106,7 @@ class FrameTime(Checked):
     """What a frame took, in seconds."""
 
     seconds: Amount
-    stages: dict[str, Amount]
+    stages: Annotated[dict[str, Amount], Field(max_length=100)]
 
 
 class Bake(Checked):
@@ -128,9 +138,9 @@ class Result(Checked):
     id: Id
     key: Sha256
     config: Config
-    title: str
-    family: str
-    label: str
+    title: Text
+    family: Text
+    label: Text
     room: Count
     kind: str
     created: str

@@ -177,6 +177,17 @@ class RunFolder:
             raise ResultsError(f"{path} is damaged: it does not say what its name does; {remedy}")
         return record
 
+    def changed_frame(self, record: Mapping[str, Any]) -> str:
+        """Say which frame of a whole result is not as it was written; empty where all are."""
+        for name, known in record["files"].items():
+            try:
+                with gate.opened(gate.inside(self.root, f"results/{record['id']}/{name}")) as file:
+                    if hashlib.file_digest(file, "sha256").hexdigest() != known["sha256"]:
+                        return f"its frame {name} was changed after the run (SHA-256 differs)"
+            except gate.GateError as problem:
+                return str(problem)
+        return ""
+
     def read_run(self) -> dict[str, Any]:
         """Read `run.json`. Raises ResultsError: no such folder, damaged, or of another format."""
         if not self.run_file.is_file():

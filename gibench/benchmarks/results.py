@@ -184,7 +184,8 @@ class Results:
 
     def prediction(self, result: str, frame: int, part: str = "full") -> Image:
         """What a result says a frame looks like, (H, W, 3) linear. Raises ResultsError."""
-        parts = predictions.read(self.folder.predictions(result) / f"{frame:04d}.exr")
+        files = self._records[result]["files"]
+        parts = predictions.read(self.root, result, frame, files[f"{frame:04d}.exr"])
         if part not in parts:
             raise ResultsError(f"result {result} has no part '{part}': its method does not tell it apart")
         return parts[part]
@@ -216,8 +217,20 @@ class Results:
 
     @cached_property
     def _scores(self) -> dict[str, dict[str, Any]]:
-        read = {id: read_scores(self.folder, id) for id, _ in self._good()}
-        return {id: scores for id, scores in read.items() if scores is not None}
+        found = {}
+        for id, record in self._good():
+            scores = read_scores(self.folder, id)
+            if scores is None:
+                continue
+            for by_metric in scores["frames"].values():
+                for metric, values in by_metric.items():
+                    if len(values) != len(record["frames"]):
+                        raise ResultsError(
+                            f"{self.folder.score_file(id)} is damaged ({len(values)} values of {metric} for "
+                            f"{len(record['frames'])} frames): remove it and run `gibench bench score {self.root}`"
+                        )
+            found[id] = scores
+        return found
 
     def _good(self) -> list[tuple[str, dict[str, Any]]]:
         return [(id, record) for id, record in self._records.items() if record["status"] == "ok"]

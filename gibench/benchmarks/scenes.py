@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
+from gibench import gate
 from gibench.baselines.booking import Booking
 from gibench.benchmarks.errors import ResultsError
 from gibench.datasets.errors import DatasetError
@@ -89,12 +90,19 @@ def scenes_in(root: Path, again: Path) -> list[SceneFiles]:
                     for _, f in frames.iterrows()
                 ),
                 halves=(
-                    tuple(root / str(file) for file in frames["file"]),
-                    tuple(again / str(file) for file in frames["file"]),
+                    tuple(_inside(root, str(file)) for file in frames["file"]),
+                    tuple(_inside(again, str(file)) for file in frames["file"]),
                 ),
             )
         )
     return scenes
+
+
+def _inside(root: Path, file: str) -> Path:
+    try:
+        return gate.inside(root, file)
+    except gate.GateError as problem:
+        raise ResultsError(f"the scenes of this run cannot be read: {problem}") from None
 
 
 def _content(root: Path, room: int) -> str:

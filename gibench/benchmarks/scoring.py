@@ -10,7 +10,6 @@ from __future__ import annotations
 import importlib.util
 import multiprocessing
 import os
-import signal
 import warnings
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
@@ -31,6 +30,7 @@ from gibench.benchmarks.result_files import FORMAT, RunFolder
 from gibench.benchmarks.scenes import SceneFiles, scenes_in
 from gibench.datasets.files import as_json, write_whole
 from gibench.datasets.making import default_threads
+from gibench.datasets.pool import leave_signals_to_parent
 from gibench.errors import GibenchError
 
 Image = NDArray[np.float32]
@@ -77,6 +77,11 @@ def score(
             if scene is None or scene.sha256 != record["config"]["scene_sha256"]:
                 problems.append(
                     f"{folder.result_file(id)} is of a scene that is not here any more: its dataset was made anew"
+                )
+                continue
+            if changed := folder.changed_frame(record):
+                problems.append(
+                    f"{folder.result_file(id)}: {changed}: remove it and run the same command again"
                 )
                 continue
             owners.append((id, scene))
@@ -135,7 +140,7 @@ def _each(units: Sequence[_Unit]) -> Iterable[tuple[dict[str, str], str]]:
 def _one_thread() -> None:
     # One process a core: torch with all cores in each of them would be slower.
     os.environ["OMP_NUM_THREADS"] = "1"
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the main process decides
+    leave_signals_to_parent()
 
 
 @dataclass(frozen=True)
@@ -240,7 +245,8 @@ def half_parts(scene: SceneFiles, which: int, frame: int) -> dict[str, Image]:
 
 
 def _predicted(folder: RunFolder, id: str) -> Frames:
-    return lambda frame: predictions.read(folder.predictions(id) / f"{frame:04d}.exr")
+    files = folder.read_result(id)["files"]
+    return lambda frame: predictions.read(folder.root, id, frame, files[f"{frame:04d}.exr"])
 
 
 def compute(

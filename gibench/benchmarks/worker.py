@@ -40,7 +40,7 @@ from gibench.baselines.stages import Stages, synchronise
 from gibench.benchmarks import predictions
 from gibench.benchmarks.scenes import SceneFiles, TrainingViews, training_views
 from gibench.datasets.files import sync_tree, through_no_link
-from gibench.datasets.pool import end_with_parent
+from gibench.datasets.pool import end_with_parent, leave_signals_to_parent
 from gibench.errors import GibenchError
 
 #: Lane of the random numbers that methods are given, far from those of the generators and the references.
@@ -79,7 +79,7 @@ def method_seed(seed: int, room: int, *more: int) -> int:
 
 def work(connection: Connection, task: Task) -> None:
     """Body of the process."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent decides
+    leave_signals_to_parent()
     threading.Thread(target=end_with_parent, daemon=True).start()
     log = open(task.log, "wb", buffering=0, opener=through_no_link)  # noqa: SIM115 - as long as the process
     for stream in (1, 2):

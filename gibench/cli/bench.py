@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from gibench.cli.dataset import AllowMissing, AllowOutside, Scale, SceneFiles, UpAxis
+from gibench.cli.output import say
 from gibench.errors import GibenchError
 
 if TYPE_CHECKING:
@@ -177,7 +178,7 @@ def score_results(
     more = () if metrics is None else names_in(metrics, "--metrics")
     with folder.claimed(), counting("results scored") as on_progress:
         scored = score(folder, more=more, on_progress=on_progress)
-    typer.echo(f"{scored.done} files of scores written in {folder.scores}")
+    say(f"{scored.done} files of scores written in {folder.scores}")
     telling.tell_scored(scored)
     if scored.problems:
         raise GibenchError(f"{len(scored.problems)} results could not be scored")
@@ -244,7 +245,7 @@ def _methods(names: str | None, track: str, plans: dict[str, Any]) -> list[Found
                 f"track {track} has settings for method '{id}', which is not installed; {nearest(id, known)}"
             )
     for broken in registry.broken:
-        typer.echo(f"left out: {broken}", err=True)
+        say(f"left out: {broken}", err=True)
     found = registry.on_track(track)
     if not found:
         raise RegistryError(f"no installed method runs on track {track}: pip install gibench brings its own")

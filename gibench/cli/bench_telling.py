@@ -8,8 +8,6 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import typer
-
 from gibench.benchmarks import statistics
 from gibench.benchmarks.errors import ResultsError
 from gibench.benchmarks.registry import installed
@@ -17,6 +15,7 @@ from gibench.benchmarks.results import Results, load
 from gibench.benchmarks.running import Report, State
 from gibench.benchmarks.scoring import Scored
 from gibench.benchmarks.track import load_track, track_names
+from gibench.cli.output import one_line, say
 from gibench.cli.progress import QUIET_SECONDS, duration
 from gibench.errors import GibenchError
 
@@ -45,7 +44,7 @@ class Teller:
 
     def _line(self, text: str) -> None:
         self._said = time.monotonic()
-        typer.echo(text, err=True)
+        say(text, err=True)
 
 
 def _outcome(record: dict[str, Any]) -> str:
@@ -73,7 +72,7 @@ def tell_scored(scored: Scored) -> None:
     for name, (why, count) in scored.skipped.items():
         _row("left out", f"{name} of {count} results: {why}")
     for problem in scored.problems:
-        typer.echo(problem, err=True)
+        say(problem, err=True)
 
 
 def tell_equal_time(root: Path, milliseconds: float) -> None:
@@ -97,21 +96,21 @@ def tell_board(root: Path) -> None:
     name = results.run["metrics"][0]
     board = statistics.leaderboard(results, name)
     several = len(set(board["machine"])) > 1
-    typer.echo(f"\n{'method':<{LABEL}} {name:>9} {'95 % interval':>17} {'ms':>8} {'prepared':>10}")
+    say(f"\n{'method':<{LABEL}} {name:>9} {'95 % interval':>17} {'ms':>8} {'prepared':>10}")
     for row in board.to_dict("records"):
         if row["mean"] != row["mean"]:
-            typer.echo(f"{_cut(row['label'], LABEL):<{LABEL}}    failed in all {row['failed']} results")
+            say(f"{_cut(row['label'], LABEL):<{LABEL}}    failed in all {row['failed']} results")
             continue
         machine = f" {row['machine'][:6]}" if several else ""
-        typer.echo(
+        say(
             f"{_cut(row['label'], LABEL):<{LABEL}} {row['mean']:9.4f} {row['low']:8.4f} {row['high']:8.4f} "
             f"{row['ms']:8.1f} {duration(row['prepare_s']):>10}{machine}"
         )
     if several:
-        typer.echo("Results of several machines: compare times within the rows of one machine alone.")
+        say("Results of several machines: compare times within the rows of one machine alone.")
     noise = statistics.floor(results, name, "full")
     if noise == noise:
-        typer.echo(f"{'(noise of the references)':<{LABEL}} {noise:9.4f}")
+        say(f"{'(noise of the references)':<{LABEL}} {noise:9.4f}")
 
 
 def tell_results(root: Path) -> None:
@@ -120,27 +119,25 @@ def tell_results(root: Path) -> None:
     table = results.results
     for row in table.to_dict("records"):
         outcome = f"{row['ms_median']:8.1f} ms" if row["status"] == "ok" else f"failed {row['reason']}"
-        typer.echo(f"{row['scene']} {_cut(row['label'], LABEL):<{LABEL}} {outcome}")
+        say(f"{row['scene']} {_cut(row['label'], LABEL):<{LABEL}} {outcome}")
     failed = int((table["status"] != "ok").sum())
-    typer.echo(f"{len(table)} results, {failed} failed; tracebacks stand in {results.folder.results}")
+    say(f"{len(table)} results, {failed} failed; tracebacks stand in {results.folder.results}")
 
 
 def show_track(name: str) -> None:
     """Print the file of a track that ships with gibench."""
     load_track(name)
-    typer.echo(
-        (resources.files("gibench.benchmarks") / "tracks" / f"{name}.toml").read_text("utf-8"), nl=False
-    )
+    say((resources.files("gibench.benchmarks") / "tracks" / f"{name}.toml").read_text("utf-8"), nl=False)
 
 
 def tell_tracks(only: str | None) -> None:
     """List tracks and their presets."""
     for name in track_names() if only is None else (only,):
         track = load_track(name)
-        typer.echo(f"track {track.id}: {track.question}")
+        say(f"track {track.id}: {track.question}")
         for preset_name, preset in track.presets.items():
             width, height = preset.recipe("reference").resolution
-            typer.echo(
+            say(
                 f"  {preset_name:<8} {preset.rooms} rooms, {preset.path_frames} frames of {width}x{height}, up to "
                 f"{preset.recipe('training').views} training views"
             )
@@ -154,17 +151,17 @@ def tell_methods(track: str | None) -> None:
             method = found.method
             if track is not None and load_track(track).id not in method.tracks:
                 continue
-            typer.echo(f"method {id}: {method.title} ({method.family}; {found.package} {found.version})")
+            say(f"method {id}: {method.title} ({method.family}; {found.package} {found.version})")
             plain = registry.methods.get(id.partition(":")[0], ()) if ":" in id else ()
             same = {knob for one in plain for knob in one.method.knobs}  # a variant's list is what it changes
             for knob in (knob for knob in method.knobs if knob not in same):
                 values = " ".join(f"[{v}]" if v == knob.default else str(v) for v in knob.values)
-                typer.echo(f"  {knob.name:<16} {values}")
+                say(f"  {knob.name:<16} {values}")
         if len(claims) > 1:
             packages = " and ".join(sorted(claim.package for claim in claims))
-            typer.echo(f"error: method '{id}' is claimed by {packages}", err=True)
+            say(f"error: method '{id}' is claimed by {packages}", err=True)
     for broken in registry.broken:
-        typer.echo(f"error: {broken}", err=True)
+        say(f"error: {broken}", err=True)
 
 
 def tell_methods_compared(results: Results, first: str, second: str) -> None:
@@ -204,17 +201,17 @@ def _one_label(results: Results, name: str) -> str:
 
 
 def _head(what: str) -> None:
-    typer.echo(f"{what:<{LABEL}} {'difference':>10} {'95 % interval':>19}  verdict of the first")
+    say(f"{what:<{LABEL}} {'difference':>10} {'95 % interval':>19}  verdict of the first")
 
 
 def _compared(text: str, first: Results, one: str, second: Results, other: str, name: str, part: str) -> None:
     try:
         difference = statistics.difference((first, one), (second, other), name, part)
     except ResultsError as problem:  # one has failed, or has no such part
-        typer.echo(f"{_cut(text, LABEL):<{LABEL}} {_cut(f'not compared: {problem}', 79 - LABEL)}")
+        say(f"{_cut(text, LABEL):<{LABEL}} {_cut(f'not compared: {problem}', 79 - LABEL)}")
         return
     interval = difference.interval
-    typer.echo(
+    say(
         f"{_cut(text, LABEL):<{LABEL}} {interval.mean:+10.2g} {interval.low:+9.2g} {interval.high:+9.2g}  "
         f"{difference.verdict}"
     )
@@ -229,19 +226,20 @@ def _times(first: Results, one: str, second: Results, other: str) -> None:
     shared = sorted(set(tables[0]["machine"]) & set(tables[1]["machine"]))
     name = one if one == other else "times"
     if not shared:
-        typer.echo(f"{_cut(name, LABEL):<{LABEL}} times not compared: they are of different machines")
+        say(f"{_cut(name, LABEL):<{LABEL}} times not compared: they are of different machines")
     for machine in shared:
         ms = [table[table["machine"] == machine]["ms_median"].mean() for table in tables]
         prepare = [table[table["machine"] == machine]["prepare_s"].mean() for table in tables]
-        typer.echo(
+        say(
             f"{_cut(name, LABEL):<{LABEL}} {ms[0]:.1f} and {ms[1]:.1f} ms, prepared in "
             f"{duration(prepare[0])} and {duration(prepare[1])}"
         )
 
 
 def _cut(text: str, width: int) -> str:
+    text = one_line(text)
     return text if len(text) <= width else text[: width - 1] + "…"
 
 
 def _row(name: str, value: str) -> None:
-    typer.echo(f"{name:<14}{value}")
+    say(f"{name:<14}{one_line(value)}")

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from gibench.cli.dataset import AllowMissing, AllowOutside, Scale, UpAxis
+from gibench.cli.output import say
 
 
 def convert(
@@ -34,4 +35,4 @@ def convert(
     except OSError as problem:
         raise SceneFileError(f"{problem.filename or out}: {problem.strerror}") from None
     tell_scene(describe(room))
-    typer.echo(str(out / "scene.xml"))
+    say(str(out / "scene.xml"))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from gibench.cli.output import say
 from gibench.errors import GibenchError
 
 if TYPE_CHECKING:
@@ -133,12 +134,12 @@ def verify(folder: Folder) -> None:
     with counting("rooms checked") as on_room:
         problems = problems_of(folder, on_room)
     for problem in problems:
-        typer.echo(f"{folder / problem.file}: {problem.what}")
+        say(f"{folder / problem.file}: {problem.what}")
     if problems:
         files = len({problem.file for problem in problems})
-        typer.echo(f"error: {len(problems)} problems in {files} files of {folder}", err=True)
+        say(f"error: {len(problems)} problems in {files} files of {folder}", err=True)
         raise typer.Exit(1)
-    typer.echo(f"{folder} is whole: every file is as it was written, every frame keeps the channel contract")
+    say(f"{folder} is whole: every file is as it was written, every frame keeps the channel contract")
 
 
 @app.command()
@@ -178,7 +179,7 @@ def preview(
         write_picture(path, picture)
     except OSError as problem:
         raise GibenchError(f"{path} cannot be written: {problem.strerror}") from None
-    typer.echo(str(path))
+    say(str(path))
 
 
 def scene_options(

@@ -11,6 +11,7 @@ from typing import Annotated, Any
 import typer
 
 import gibench
+from gibench.cli.output import say
 
 #: Packages whose versions matter when something goes wrong; the last ones come with extras.
 PACKAGES = ("mitsuba", "drjit", "mitsuba-oidn", "numpy", "OpenEXR", "pandas", "torch", "lpips")
@@ -26,7 +27,7 @@ def doctor(as_json: Annotated[bool, typer.Option("--json", help="For programs.")
     """Say what rendering would use on this machine, and what is missing with the command that mends it."""
     facts = examine()
     if as_json:
-        typer.echo(json.dumps(facts, indent=1, ensure_ascii=False))
+        say(json.dumps(facts, indent=1, ensure_ascii=False))
     else:
         _tell(facts)
     if facts["variant"] is None:
@@ -105,7 +106,7 @@ def _tell(facts: dict[str, Any]) -> None:
     for name, text in rows.items():
         lines = [piece for line in text.splitlines() for piece in _wrapped(line, is_note=name == "to mend")]
         for i, line in enumerate(lines):
-            typer.echo(f"{name if i == 0 else '':<14}{line}")
+            say(f"{name if i == 0 else '':<14}{line}")
 
 
 def _wrapped(line: str, *, is_note: bool) -> list[str]:

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
-import typer
-
+from gibench import gate
+from gibench.cli.output import one_line, say
 from gibench.cli.progress import amount, counting, duration, making
+from gibench.datasets.checked import parsed
 from gibench.datasets.estimating import estimate
 from gibench.datasets.folder import room_folder, whole_rooms
 from gibench.datasets.making import make
 from gibench.datasets.recipes import Recipe
+from gibench.datasets.records import Described
 
 #: Rewrites of scene files that change names alone; they are counted.
 QUIET_RULES = ("property_names", "transform_tags")
@@ -25,12 +26,12 @@ def make_and_tell(root: Path, recipe: Recipe, variant: str, workers: int, comman
             root, recipe, variant=variant, workers=workers, command=command, on_progress=on_progress
         )
     if summary.made == 0:
-        typer.echo(f"{root} is already complete")
+        say(f"{root} is already complete")
     describe(root, summary.manifest)
     if summary.made:
         seconds = summary.seconds / max(summary.frames, 1)
-        typer.echo(_row("this run", f"{duration(summary.seconds)}, {seconds:.2f} s a frame"))
-        typer.echo(_row("look at it", f"{root / 'preview.png'}"))
+        say(_row("this run", f"{duration(summary.seconds)}, {seconds:.2f} s a frame"))
+        say(_row("look at it", f"{root / 'preview.png'}"))
 
 
 def describe(root: Path, manifest: dict[str, Any]) -> None:
@@ -39,25 +40,23 @@ def describe(root: Path, manifest: dict[str, Any]) -> None:
     width, height = recipe["resolution"]
     samples = f"{recipe['spp']} spp" if recipe["error"] is None else f"until error {recipe['error']:g}"
     done = "" if manifest["complete"] else f" of {recipe['rooms']}, not complete"
-    typer.echo(_row("dataset", str(root)))
+    say(_row("dataset", str(root)))
     if totals is not None:
         splits = ", ".join(f"{name} {count}" for name, count in totals["splits"].items())
-        typer.echo(_row("rooms", f"{totals['rooms']}{done}"))
-        typer.echo(_row("frames", f"{totals['frames']} ({splits}), {width}x{height}, {samples}"))
+        say(_row("rooms", f"{totals['rooms']}{done}"))
+        say(_row("frames", f"{totals['frames']} ({splits}), {width}x{height}, {samples}"))
     denoised = "denoised" if recipe["denoise"] else "not denoised"
-    typer.echo(_row("channels", f"{len(recipe['channels'])}, {denoised}"))
+    say(_row("channels", f"{len(recipe['channels'])}, {denoised}"))
     if totals is not None:
         if totals["median_error"] is not None:
-            typer.echo(_row("median error", f"{100 * totals['median_error']:.2g} % (of the samples)"))
-        typer.echo(
-            _row("size", f"{amount(totals['bytes'], 'B')} ({amount(totals['frame_bytes'], 'B')} in frames)")
-        )
+            say(_row("median error", f"{100 * totals['median_error']:.2g} % (of the samples)"))
+        say(_row("size", f"{amount(totals['bytes'], 'B')} ({amount(totals['frame_bytes'], 'B')} in frames)"))
         if totals["kernel_seconds"] > 0:
             speed = amount(totals["paths"] / totals["kernel_seconds"], "paths/s")
-            typer.echo(_row("rendering", f"{duration(totals['kernel_seconds'])} in kernels, {speed}"))
+            say(_row("rendering", f"{duration(totals['kernel_seconds'])} in kernels, {speed}"))
         if changes := totals.get("denoise_changes"):
             worst = changes[0]
-            typer.echo(
+            say(
                 _row(
                     "denoising",
                     f"warning: changed the mean of a part by more than 3 % in {len(changes)} frames; most in room "
@@ -65,19 +64,19 @@ def describe(root: Path, manifest: dict[str, Any]) -> None:
                 )
             )
         if totals["invalid_paths"]:
-            typer.echo(_row("invalid paths", f"{totals['invalid_paths']}, counted as 0"))
+            say(_row("invalid paths", f"{totals['invalid_paths']}, counted as 0"))
     _tell_rejections(manifest.get("rejections", {}), manifest["rejected_rooms"])
     if recipe.get("scenes"):
         _tell_scenes(root)
     versions = manifest["versions"]
-    typer.echo(
+    say(
         _row(
             "made with",
             f"gibench {versions['gibench']}, Mitsuba {versions['mitsuba']}, {manifest['variant']}",
         )
     )
-    typer.echo(_row("licence", manifest["licence"]))
-    typer.echo(_row("command", manifest["command"]))
+    say(_row("licence", manifest["licence"]))
+    say(_row("command", manifest["command"]))
 
 
 def dry_run(recipe: Recipe, variant: str, workers: int) -> None:
@@ -85,18 +84,22 @@ def dry_run(recipe: Recipe, variant: str, workers: int) -> None:
     with counting("rooms built and checked") as on_room:
         result = estimate(recipe, variant=variant, workers=workers, on_room=on_room)
     most = "at most " if recipe.spp is None else "about "
-    typer.echo(_row("rooms", f"{result.rooms} built and checked, {1000 * result.build_seconds:.0f} ms each"))
+    say(_row("rooms", f"{result.rooms} built and checked, {1000 * result.build_seconds:.0f} ms each"))
     _tell_rejections(result.rejections, result.rejected_rooms)
-    typer.echo(_row("frames", f"{result.frames}, about {result.seconds_per_frame:.2g} s each"))
+    say(_row("frames", f"{result.frames}, about {result.seconds_per_frame:.2g} s each"))
     speed = amount(result.paths_per_second, "paths/s")
-    typer.echo(_row("time", f"{most}{duration(result.seconds)} ({result.variant}, {speed})"))
-    typer.echo(_row("disk", f"about {amount(result.bytes, 'B')}"))
-    typer.echo("Time and disk are scaled from one small frame of a first room; nothing was kept.")
+    say(_row("time", f"{most}{duration(result.seconds)} ({result.variant}, {speed})"))
+    say(_row("disk", f"about {amount(result.bytes, 'B')}"))
+    say("Time and disk are scaled from one small frame of a first room; nothing was kept.")
 
 
 def _tell_scenes(root: Path) -> None:
     for room in whole_rooms(root):
-        tell_scene(json.loads((room_folder(root, room) / "room.json").read_text(encoding="utf-8")))
+        path = room_folder(root, room) / "room.json"
+        try:
+            tell_scene(parsed(gate.read_inside(root, path.relative_to(root)), Described))
+        except (gate.GateError, ValueError) as problem:
+            say(_row("scene", f"{path} is damaged: {problem}"))
 
 
 def tell_scene(described: dict[str, Any]) -> None:
@@ -104,14 +107,14 @@ def tell_scene(described: dict[str, Any]) -> None:
     source = described["source"]
     changes = sum(change["count"] for change in source["changes"])
     placed = f"{source['up']} up" + ("" if source["scale"] == 1 else f", scale {source['scale']:g}")
-    typer.echo(_row("scene", f"{described['kind']}: {placed}, {changes} changes"))
+    say(_row("scene", f"{described['kind']}: {placed}, {changes} changes"))
     for warning in source["warnings"]:
-        typer.echo(_row("", f"warning: {warning}"))
+        say(_row("", f"warning: {warning}"))
     for change in source["changes"]:
         if change["loss"] or change["rule"] not in QUIET_RULES:
             times = "" if change["count"] == 1 else f" ({change['count']} times)"
             mark = "warning: " if change["loss"] else ""
-            typer.echo(_row("", f"{mark}{change['what']}{times}"))
+            say(_row("", f"{mark}{change['what']}{times}"))
 
 
 def _tell_rejections(rejections: dict[str, int], rooms: dict[Any, str]) -> None:
@@ -119,10 +122,10 @@ def _tell_rejections(rejections: dict[str, int], rooms: dict[Any, str]) -> None:
         listed = ", ".join(
             f"{reason} {count}" for reason, count in sorted(rejections.items(), key=lambda r: -r[1])
         )
-        typer.echo(_row("rejected", f"{sum(rejections.values())} tries: {listed}"))
+        say(_row("rejected", f"{sum(rejections.values())} tries: {listed}"))
     for room, reason in rooms.items():
-        typer.echo(_row("left out", f"room {room}: {reason}"))
+        say(_row("left out", f"room {room}: {reason}"))
 
 
 def _row(name: str, value: str) -> str:
-    return f"{name:<14}{value}"
+    return f"{name:<14}{one_line(value)}"

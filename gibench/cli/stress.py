@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from gibench.cli.output import say
+
 if TYPE_CHECKING:
     from gibench.stress.running import Report
 
@@ -36,11 +38,11 @@ def stress(
     write_tables(report, out)
     write_pictures(report, out)
     tell(report)
-    typer.echo(f"the table: {out / 'stress.md'}, {out / 'stress.csv'}, {out / 'stress.png'}")
+    say(f"the table: {out / 'stress.md'}, {out / 'stress.csv'}, {out / 'stress.png'}")
     from gibench.stress.registry import FAIL
 
     if failed := report.of(FAIL):
-        typer.echo(f"error: {len(failed)} of {len(report.rows)} checks failed", err=True)
+        say(f"error: {len(failed)} of {len(report.rows)} checks failed", err=True)
         raise typer.Exit(1)
 
 
@@ -55,5 +57,5 @@ def tell(report: Report) -> None:
             check = row.check
             numbers = f"{check.error:.3g} where {check.bound:.3g} is the bound"
             text = f"{said}: {row.case}: {check.part}: {check.what}: {numbers}"
-            typer.echo(textwrap.fill(text, WIDTH, subsequent_indent="  ", break_on_hyphens=False))
-    typer.echo(summary(report))
+            say(textwrap.fill(text, WIDTH, subsequent_indent="  ", break_on_hyphens=False))
+    say(summary(report))

@@ -22,6 +22,8 @@ import OpenEXR
 from numpy.typing import NDArray
 
 from gibench.datasets.errors import StorageError, UnknownChannel, nearest
+from gibench.datasets.exr_header import HeaderError, read_header
+from gibench.gate import GateError
 from gibench.rendering.channels import CHANNELS, PARTS, Channel
 
 #: Largest relative error that storing a value as half may bring, on any pixel.
@@ -153,10 +155,12 @@ def decode(
     Returns channel → (H, W, C) float16, float32 or uint32 as stored; widen: float32 in place of float16. The
     file interleaves its layers within blocks of 16 lines, so everything is decompressed either way; only
     what is asked for is put together. Raises `UnknownChannel` for a channel that the file lacks,
-    `StorageError` for a broken file.
+    `StorageError` for a broken file, for one that states more than it can hold, and for one without any channel.
     """
+    present = present_channels(source)
+    if not present:
+        raise StorageError(f"{_place(source)} holds no channel of a frame")
     layers = {name: layer.pixels for name, layer in _opened(source).items()}
-    present = _channels_in(layers)
     names = tuple(channels) if channels is not None else present
     for name in names:
         if name not in present:
@@ -166,7 +170,10 @@ def decode(
 
 def present_channels(source: Path | bytes) -> tuple[str, ...]:
     """Names of the channels that a file holds, read from its header. Raises `StorageError`."""
-    return _channels_in(_opened(source, header_only=True))
+    try:
+        return _channels_in(read_header(source).layers)
+    except (HeaderError, GateError) as problem:
+        raise StorageError(f"{_place(source)} cannot be read as OpenEXR: {problem}") from None
 
 
 def _channels_in(layers: Iterable[str]) -> tuple[str, ...]:
@@ -174,12 +181,9 @@ def _channels_in(layers: Iterable[str]) -> tuple[str, ...]:
     return tuple(c.name for c in CHANNELS.values() if layers.issuperset(layer_names(c)))
 
 
-def _opened(source: Path | bytes, *, header_only: bool = False) -> dict[str, Any]:
+def _opened(source: Path | bytes) -> dict[str, Any]:
     try:
         file = io.BytesIO(source) if isinstance(source, bytes) else str(source)
-        if header_only:
-            with OpenEXR.File(file, header_only=True) as opened:
-                return {layer.name: layer for layer in opened.header()["channels"]}
         with OpenEXR.File(file, separate_channels=True) as opened:
             return dict(opened.channels())
     except Exception as problem:  # OpenEXR raises whatever its C++ side threw

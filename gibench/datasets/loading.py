@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from gibench import gate
 from gibench.datasets.errors import DatasetError, nearest
 from gibench.datasets.exr import decode, present_channels
-from gibench.datasets.folder import TABLE, room_folder
-from gibench.datasets.manifest import read_manifest, room_record
+from gibench.datasets.folder import TABLE, room_folder, whole_rooms
+from gibench.datasets.manifest import frame_table, read_manifest, recipe_of, room_record
+from gibench.datasets.table import read_table
 from gibench.rendering.camera import PinholeCamera
 
 if TYPE_CHECKING:
@@ -146,8 +148,14 @@ class Dataset:
             if not -len(self) <= number < len(self):
                 raise IndexError(f"frame {number} of {len(self)}")
             row: dict[str, Any] = {str(k): v for k, v in self.frames.iloc[number].to_dict().items()}
-            return Frame(self.root / row["file"], row)
+            return Frame(self._frame_file(row["file"]), row)
         return self._part(np.arange(len(self))[index])
+
+    def _frame_file(self, name: str) -> Path:
+        try:
+            return gate.inside(self.root, name)
+        except gate.GateError as problem:
+            raise DatasetError(f"frame {problem}") from None
 
     def _numbers(self, index: NDArray[Any]) -> NDArray[np.int64]:
         if index.ndim != 1 or (index.size and index.dtype.kind not in "iub"):
@@ -194,27 +202,28 @@ class Dataset:
             from gibench.datasets.torch_frames import TorchFrames
         except ImportError:
             raise DatasetError("torch is not installed: pip install 'gibench[bench]'") from None
-        return TorchFrames([self.root / file for file in self.frames["file"]], channels)
+        return TorchFrames(self.root, list(self.frames["file"]), channels)
 
 
 def open_dataset(root: str | Path) -> Dataset:
     """Open a dataset that `make-dataset` wrote; pixels are read when a frame is asked for them.
 
-    An unfinished dataset opens with the frames that were whole when its last run ended. Raises
-    `DatasetError`.
+    An unfinished dataset opens with the frames that were whole when its last run ended, or, where that was killed,
+    with those of the rooms that are whole now. Raises `DatasetError`.
     """
     root = Path(root)
     manifest = read_manifest(root)
-    import pandas as pd
-
+    recipe = recipe_of(manifest)
     try:
-        frames = pd.read_parquet(root / TABLE)
-    except FileNotFoundError:
-        raise DatasetError(
-            f"{root} has no {TABLE}: its making was cut off; to continue it run `{manifest['command']}`"
-        ) from None
-    except (OSError, ValueError) as problem:
-        raise DatasetError(
-            f"{root / TABLE} is damaged ({problem}): remove it and run `{manifest['command']}`"
-        ) from None
+        frames = read_table(root, recipe)
+    except gate.GateError as problem:
+        if not problem.missing:
+            raise DatasetError(f"{root / TABLE} cannot be read: {problem}") from None
+        # The run was killed before it wrote the table; every whole room has its own part of it.
+        frames = frame_table((room_record(root, room) for room in whole_rooms(root)), recipe)
+        if not len(frames):
+            raise DatasetError(
+                f"{root} has no {TABLE} and no whole room: its making was cut off; to continue it run "
+                f"`{manifest['command']}`"
+            ) from None
     return Dataset(root, manifest, frames)

@@ -13,6 +13,11 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pydantic import ValidationError
+
+from gibench import gate
+from gibench.datasets import records
+from gibench.datasets.checked import first_problem, parsed, plain, shown
 from gibench.datasets.errors import DatasetError, FolderError
 from gibench.datasets.files import as_json, write_whole
 from gibench.datasets.folder import MANIFEST, RECORD, TABLE, room_folder, whole_rooms
@@ -24,28 +29,35 @@ if TYPE_CHECKING:
 #: Version of the layout on disk; a reader refuses what it does not know.
 FORMAT = 1
 
-#: What every manifest holds, finished or not.
-NEEDED = ("complete", "identity", "licence", "command", "variant", "versions", "runs", "rejected_rooms")
-
 
 def read_manifest(root: Path) -> dict[str, Any]:
     """Read `dataset.json`. Raises `DatasetError` when the folder is no dataset or of another format."""
     try:
-        manifest = json.loads((root / MANIFEST).read_text(encoding="utf-8"))
-        known = manifest["format"] == FORMAT
-        if known:
-            recipe_of(manifest)
-            _ = [manifest[key] for key in NEEDED]
-    except OSError:
+        content = gate.read_inside(root, MANIFEST)
+        manifest = plain(content)
+        if (there := manifest.get("format", FORMAT)) != FORMAT:
+            versions = manifest.get("versions")
+            maker = versions.get("gibench", "unknown") if isinstance(versions, dict) else "unknown"
+            there, maker = shown(str(there))[1:-1], shown(str(maker))[1:-1]
+            raise DatasetError(
+                f"{root} is of format {there}, this gibench reads format {FORMAT}: install the gibench that made it "
+                f"({maker})"
+            )
+        manifest = parsed(content, records.Manifest)
+        recipe_of(manifest)
+    except gate.GateError as problem:
+        if not problem.missing:
+            raise DatasetError(f"{root / MANIFEST} is damaged ({problem})") from None
         raise DatasetError(f"{root} is no dataset: it has no readable {MANIFEST}") from None
-    except (ValueError, KeyError, TypeError):
-        raise DatasetError(f"{root / MANIFEST} is damaged: it is no manifest of a dataset") from None
-    if not known:
+    except ValidationError as problems:
         raise DatasetError(
-            f"{root} is of format {manifest['format']}, this gibench reads format {FORMAT}: install the "
-            f"gibench that made it ({manifest.get('versions', {}).get('gibench', 'unknown')})"
-        )
-    return dict(manifest)
+            f"{root / MANIFEST} is damaged: it is no manifest of a dataset (recipe: {first_problem(problems)})"
+        ) from None
+    except ValueError as problem:
+        raise DatasetError(
+            f"{root / MANIFEST} is damaged: it is no manifest of a dataset ({problem})"
+        ) from None
+    return manifest
 
 
 def recipe_of(manifest: Mapping[str, Any]) -> Recipe:
@@ -120,11 +132,14 @@ def room_record(root: Path, room: int) -> dict[str, Any]:
     """Read the record of a whole room. Raises `DatasetError` when it is damaged."""
     path = room_folder(root, room) / RECORD
     try:
-        return dict(json.loads(path.read_text(encoding="utf-8")))
-    except (OSError, ValueError) as problem:
+        record = parsed(gate.read_inside(root, path.relative_to(root)), records.RoomRecord)
+    except (gate.GateError, ValueError) as problem:
         raise DatasetError(
             f"{path} is damaged ({problem}): remove {path.parent} and make the room again"
         ) from None
+    if record["room"] != room:
+        raise DatasetError(f"{path} is the record of room {record['room']}: remove {path.parent}")
+    return record
 
 
 def gathered(root: Path, manifest: Mapping[str, Any]) -> tuple[dict[str, Any], pd.DataFrame]:

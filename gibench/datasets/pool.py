@@ -155,7 +155,7 @@ def _hired(work: Work) -> _Worker:
 
 def _worker(connection: Connection, work: Work) -> None:
     """Body of a worker process: set up, then a room after another until the other end closes."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the main process decides
+    leave_signals_to_parent()
     threading.Thread(target=end_with_parent, daemon=True).start()
     room: int | None = None
     try:
@@ -173,6 +173,13 @@ def _worker(connection: Connection, work: Work) -> None:
             traceback.print_exc()
         with contextlib.suppress(OSError):
             connection.send(("failed", _explained(problem, room)))
+
+
+def leave_signals_to_parent() -> None:
+    """Ignore what asks to end: it reaches a whole group, and the process that spawned this one decides."""
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
 
 
 def end_with_parent() -> None:

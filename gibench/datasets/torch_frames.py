@@ -9,14 +9,16 @@ import numpy as np
 import torch
 from torch.utils.data import Dataset
 
+from gibench import gate
 from gibench.datasets.exr import decode
 
 
 class TorchFrames(Dataset[dict[str, torch.Tensor]]):
     """A map-style dataset over frame files; see `gibench.datasets.loading.Dataset.torch`."""
 
-    def __init__(self, files: Sequence[Path], channels: Sequence[str]) -> None:
-        """files: one OpenEXR file a frame. channels: what an item holds."""
+    def __init__(self, root: Path, files: Sequence[str], channels: Sequence[str]) -> None:
+        """root: of the dataset. files: one OpenEXR file a frame, from there. channels: what an item holds."""
+        self.root = root
         self.files = list(files)
         self.channels = tuple(channels)
 
@@ -26,7 +28,7 @@ class TorchFrames(Dataset[dict[str, torch.Tensor]]):
 
     def __getitem__(self, index: int) -> dict[str, torch.Tensor]:
         """Return channel → (C, H, W): float32, ids int64 (torch cannot index with uint32)."""
-        arrays = decode(self.files[index], self.channels, widen=True)
+        arrays = decode(gate.inside(self.root, self.files[index]), self.channels, widen=True)
         return {name: _tensor(np.moveaxis(values, -1, 0)) for name, values in arrays.items()}
 
 

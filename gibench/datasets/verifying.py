@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,11 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gibench import gate
 from gibench.datasets.errors import DatasetError, StorageError
 from gibench.datasets.exr import decode, is_radiance, total_of_parts
-from gibench.datasets.folder import MANIFEST, PREVIEW, TABLE, room_folder, whole_rooms
+from gibench.datasets.exr_header import HeaderError, read_header
+from gibench.datasets.folder import MANIFEST, PREVIEW, TABLE, whole_rooms
 from gibench.datasets.manifest import frame_table, read_manifest, recipe_of, room_record
 from gibench.datasets.recipes import Recipe
+from gibench.datasets.table import read_table
 from gibench.rendering.channels import CHANNELS, PARTS
 
 #: Types in which a kind of channel may be stored.
@@ -62,10 +66,6 @@ def verify(root: Path, on_room: Callable[[int, int], None] = lambda done, of: No
             records.append(record)
         except DatasetError as problem:
             problems.append(Problem(f"rooms/{room:06d}/frames.json", str(problem)))
-        except (KeyError, TypeError, AttributeError) as problem:
-            problems.append(
-                Problem(f"rooms/{room:06d}/frames.json", f"the record lacks what it should hold: {problem!r}")
-            )
     on_room(len(expected), len(expected))
     problems.extend(_table_problems(root, records, recipe))
     if not (root / PREVIEW).is_file():
@@ -74,15 +74,12 @@ def verify(root: Path, on_room: Callable[[int, int], None] = lambda done, of: No
 
 
 def _room_problems(root: Path, record: Mapping[str, Any], recipe: Recipe, room: int) -> Iterator[Problem]:
-    folder, name = room_folder(root, room), f"rooms/{room:06d}"
-    if record["room"] != room:
-        yield Problem(f"{name}/frames.json", f"the record is that of room {record['room']}")
+    name = f"rooms/{room:06d}"
     for required in ("room.json", "scene.xml", "room.glb"):
         if required not in record["files"]:
             yield Problem(f"{name}/{required}", "the room was stored without this file")
     for file, known in record["files"].items():
-        _, problem = _content(folder / file, known)
-        if problem:
+        if problem := _file_problem(root, f"{name}/{file}", known):
             yield Problem(f"{name}/{file}", problem)
     views = [frame["view"] for frame in record["frames"]]
     asked = recipe.rendered_views(
@@ -93,29 +90,38 @@ def _room_problems(root: Path, record: Mapping[str, Any], recipe: Recipe, room: 
             f"{name}/frames.json", f"{len(views)} frames are recorded, the recipe has {len(asked)} views"
         )
     for frame in record["frames"]:
-        content, problem = _content(folder / frame["file"], frame)
-        if problem:
-            yield Problem(f"{name}/{frame['file']}", problem)
-        if content is None:
-            continue
+        place = f"{name}/{frame['file']}"
+        if problem := _file_problem(root, place, frame):
+            yield Problem(place, problem)
         try:
-            for fault in frame_faults(decode(content), recipe):
-                yield Problem(f"{name}/{frame['file']}", fault)
-        except StorageError as fault:
-            yield Problem(f"{name}/{frame['file']}", str(fault))
+            path = gate.inside(root, place)
+            header = read_header(path)
+            if (header.width, header.height) != recipe.resolution:
+                asked_size = "x".join(map(str, recipe.resolution))
+                yield Problem(
+                    place, f"the image is {header.width}x{header.height}, the recipe asks for {asked_size}"
+                )
+                continue
+            for fault in frame_faults(decode(path), recipe):
+                yield Problem(place, fault)
+        except gate.GateError:
+            continue  # said above
+        except (HeaderError, StorageError) as fault:
+            yield Problem(place, str(fault))
 
 
-def _content(path: Path, known: Mapping[str, Any]) -> tuple[bytes | None, str]:
-    """Content of a file where it can be read, and what is wrong with it."""
+def _file_problem(root: Path, file: str, known: Mapping[str, Any]) -> str:
+    """What is wrong with a file of a room; empty where it is as it was written."""
     try:
-        content = path.read_bytes()
-    except OSError as problem:
-        return None, f"cannot be read: {problem.strerror}"
-    if len(content) != known["bytes"]:
-        return content, f"holds {len(content)} bytes, {known['bytes']} were written"
-    if hashlib.sha256(content).hexdigest() != known["sha256"]:
-        return content, "was changed after it was written (SHA-256 differs)"
-    return content, ""
+        with gate.opened(gate.inside(root, file)) as content:
+            size = os.fstat(content.fileno()).st_size
+            if size != known["bytes"]:
+                return f"holds {size} bytes, {known['bytes']} were written"
+            if hashlib.file_digest(content, "sha256").hexdigest() != known["sha256"]:
+                return "was changed after it was written (SHA-256 differs)"
+    except gate.GateError as problem:
+        return str(problem)
+    return ""
 
 
 def frame_faults(arrays: Mapping[str, NDArray[Any]], recipe: Recipe) -> Iterator[str]:
@@ -146,15 +152,14 @@ def frame_faults(arrays: Mapping[str, NDArray[Any]], recipe: Recipe) -> Iterator
 
 
 def _table_problems(root: Path, records: list[dict[str, Any]], recipe: Recipe) -> Iterator[Problem]:
-    import pandas as pd
-
     try:
-        table = pd.read_parquet(root / TABLE)
-    except FileNotFoundError:
-        yield Problem(TABLE, "the table is missing: the run that made the dataset was cut off")
+        table = read_table(root, recipe)
+    except gate.GateError as problem:
+        what = "the table is missing: the run that made the dataset was cut off"
+        yield Problem(TABLE, what if problem.missing else str(problem))
         return
-    except (OSError, ValueError) as problem:
-        yield Problem(TABLE, f"the table is damaged: {' '.join(str(problem).split())}")
+    except DatasetError as problem:
+        yield Problem(TABLE, str(problem))
         return
     if not frame_table(records, recipe).equals(table):
         yield Problem(TABLE, "the table does not say what the records of the rooms say")

@@ -331,7 +331,7 @@ def training_inputs() -> Found:
     with TemporaryDirectory() as folder:
         file = Path(folder) / "0000.exr"
         file.write_bytes(exr.encode(arrays))
-        tensors = TorchFrames([file], list(arrays))[0]
+        tensors = TorchFrames(Path(folder), [file.name], list(arrays))[0]
     lost = float(sum((~tensor.isfinite()).sum().item() for tensor in tensors.values()))
     yield Check("files", "values that are not finite", lost, 0, "the contract")
     dark = exr.dark_radiance(arrays)

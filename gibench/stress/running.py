@@ -6,7 +6,6 @@ import gc
 import importlib.util
 import multiprocessing
 import os
-import signal
 import threading
 import time
 import traceback
@@ -15,7 +14,7 @@ from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 
-from gibench.datasets.pool import end_with_parent
+from gibench.datasets.pool import end_with_parent, leave_signals_to_parent
 from gibench.errors import GibenchError
 from gibench.rendering.backend import select_variant
 from gibench.stress.registry import Case, Check, Curve, all_cases
@@ -141,7 +140,7 @@ def _hired(quick: bool, only: str, done: Sequence[str]) -> tuple[Connection, Bas
 
 def _work(connection: Connection, quick: bool, only: str, done: tuple[str, ...]) -> None:
     """Body of the process: say which cases are left, then run one after the other."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the main process decides
+    leave_signals_to_parent()
     threading.Thread(target=end_with_parent, daemon=True).start()
     left = [one for one in chosen(quick, only) if one.name not in done]
     connection.send(("cases", [replace(one, run=None) for one in left]))

@@ -1,3 +1,5 @@
+import hashlib
+
 import numpy as np
 import pytest
 
@@ -57,20 +59,31 @@ def test_frames_come_back_as_they_were(tmp_path):
         "full": np.exp(rng.uniform(-5, 5, (5, 7, 3))).astype(np.float32),
         "specular": np.exp(rng.uniform(0, 14, (5, 7, 3))).astype(np.float32),  # beyond half
     }
-    (tmp_path / "0000.exr").write_bytes(predictions.encode(parts))
-    back = predictions.read(tmp_path / "0000.exr")
+    back = read_back(tmp_path, predictions.encode(parts))
     assert list(back) == ["full", "specular"]
     np.testing.assert_allclose(back["full"], parts["full"], rtol=1e-3, atol=1e-4)
     np.testing.assert_array_equal(back["specular"], parts["specular"])
-    (tmp_path / "0001.exr").write_bytes(predictions.encode({"full": parts["full"]}))
-    assert list(predictions.read(tmp_path / "0001.exr")) == ["full"]
+    assert list(read_back(tmp_path, predictions.encode({"full": parts["full"]}))) == ["full"]
+
+
+def read_back(root, written, *, then=None):
+    """What is read of a frame, or of one that was changed after it was written."""
+    path = root / "results" / "id" / "0000.exr"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(written if then is None else then)
+    known = {"sha256": hashlib.sha256(written).hexdigest(), "bytes": len(written)}
+    return predictions.read(root, "id", 0, known)
 
 
 def test_a_damaged_frame_is_named(tmp_path):
-    path = tmp_path / "0000.exr"
-    path.write_bytes(predictions.encode({"full": good()})[:200])
-    with pytest.raises(ResultsError, match=r"0000\.exr cannot be read .*run the same command again"):
-        predictions.read(path)
+    whole = predictions.encode({"full": good()})
+    named = r"0000\.exr cannot be read .*remove .*results/id\.json and run the same command again"
+    with pytest.raises(ResultsError, match=named):
+        read_back(tmp_path, whole[:200])
+    other = predictions.encode({"full": good() + 1})
+    for changed in (whole[:-9], whole + b"x" * 9, other):
+        with pytest.raises(ResultsError, match=named):
+            read_back(tmp_path, whole, then=changed)
 
 
 def test_images_of_any_library_are_taken():

@@ -5,12 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from pandas.api.types import is_numeric_dtype
+
 from gibench.benchmarks.report.source import ReportSource
 from gibench.benchmarks.report.summary import COSTS, ENTRY, Summary
 from gibench.datasets.files import write_whole
 
 if TYPE_CHECKING:
     import pandas as pd
+
+FORMULA = ("=", "+", "-", "@", "\t", "\r")
+"""What a text begins with that spreadsheets compute."""
 
 _WHO = ["track", "scene", "method", "label", "knobs", "seed", "machine", "result"]
 
@@ -32,8 +37,21 @@ def write_csv_files(source: ReportSource, summary: Summary, out: Path) -> list[P
         "results.csv": summary.results.drop(columns="entry"),
     }
     for name, table in tables.items():
-        write_whole(out / name, table.to_csv(index=False, float_format="%.7g").encode())
+        write_whole(out / name, _plain(table).to_csv(index=False, float_format="%.7g").encode())
     return [out / name for name in tables]
+
+
+def _plain(table: pd.DataFrame) -> pd.DataFrame:
+    """Texts that no spreadsheet takes for a formula: one that begins like one gets an apostrophe before it."""
+    table = table.copy()
+    for name in table.columns:
+        if not is_numeric_dtype(table[name]):
+            texts = table[name].astype("object")
+            formula = texts.map(
+                lambda text: isinstance(text, str) and text.startswith(("=", "+", "-", "@", "\t", "\r"))
+            )
+            table[name] = texts.where(~formula, "'" + texts.astype(str))
+    return table
 
 
 def leaderboard(summary: Summary) -> pd.DataFrame:

@@ -45,6 +45,7 @@ STYLE: Any = {
     "text.color": INK,
     "grid.color": "#e3e3e3",
     "grid.linewidth": 0.5,
+    "text.parse_math": False,  # a dollar in somebody's label is a dollar
     "svg.hashsalt": "gibench",  # the same plot is the same file
 }
 

@@ -28,7 +28,7 @@ from gibench.benchmarks.report.plot_style import (
 from gibench.benchmarks.report.source import PARTS, ReportSource
 from gibench.benchmarks.report.summary import Summary
 from gibench.benchmarks.report.tables import stage_times
-from gibench.benchmarks.report.wording import metric_title, number
+from gibench.benchmarks.report.wording import metric_title, number, printable
 from gibench.metrics import METRICS
 
 if TYPE_CHECKING:
@@ -47,6 +47,12 @@ FARTHEST_FLOOR = 30.0
 
 SMALL = 6.8
 """Points: the type of labels."""
+
+ATTEMPTS = 12
+"""How often a plot is made taller, by a quarter each, so that all names find a place."""
+
+LONGEST_LABEL = 48
+"""Characters of a name in a plot, which is about 130 of them wide."""
 
 NOISE_BELOW = "noise floor, off the axis"
 
@@ -76,6 +82,13 @@ COSTS = (
 
 def write_plots(source: ReportSource, summary: Summary, out: Path) -> list[Path]:
     """Write every plot as SVG and PNG into a folder; times of different machines never share one."""
+    import matplotlib
+
+    with matplotlib.rc_context(STYLE):
+        return _written(source, summary, out)
+
+
+def _written(source: ReportSource, summary: Summary, out: Path) -> list[Path]:
     written: list[Path] = []
     for track in summary.tracks:
         prefix = f"{track}-" if len(summary.tracks) > 1 else ""
@@ -119,7 +132,7 @@ def error_against(
         return None
     higher = METRICS[metric].direction == "higher"
     title = f"{metric_title(metric)} against {cost.title}"
-    for attempt in range(12):
+    for attempt in range(ATTEMPTS):
         figure, axes = _figure(WIDTH, HEIGHT * 1.25**attempt)
         _title(figure, title, _about(summary, track, part, machine))
         logarithmic = not higher and bool((points["mean"] > 0).all())
@@ -134,9 +147,9 @@ def error_against(
         obstacles = [*_curves(axes, x, points, summary), *_along(axes, *front, corners=False)]
         if math.isfinite(floor):
             obstacles += _along(axes, np.array(axes.get_xlim()), np.array([floor, floor]), corners=False)
-        if _label(figure, axes, x, points, front, floor, obstacles):
-            return figure
-    raise AssertionError("a taller figure always has room for its labels")
+        if _label(figure, axes, x, points, front, floor, obstacles) or attempt == ATTEMPTS - 1:
+            break
+    return figure
 
 
 def _points(
@@ -183,7 +196,7 @@ def _about(summary: Summary, track: str, part: str, machine: str | None) -> str:
         if rooms > 1
         else "one room, 95 % intervals over its frames"
     )
-    words = [PARTS.get(part, part), f"track {track}", over]
+    words = [PARTS.get(part, part), f"track {_short(track)}", over]
     if machine:
         words.append(machine if len(machine) < 40 else machine[:38] + "…")
     return "  ·  ".join(words)
@@ -300,7 +313,10 @@ def _label(
     floor: float,
     obstacles: list[Box],
 ) -> bool:
-    """Name every curve beside it, and its settings where there is room. False where a name found no place."""
+    """Name every curve beside it, and its settings where there is room. False where a name found no place.
+
+    Names without a place are left out: of hundreds of settings the tables tell.
+    """
     scale = PIXELS_PER_INCH / 72
     wanted: list[tuple[str, Any, bool]] = []
     pixels = axes.transData.transform(np.column_stack([x, points["mean"]]))
@@ -320,11 +336,11 @@ def _label(
         missing = not own["whole"].all()
         note = " (not all rooms)" if missing else ""
         if len(own) == 1:
-            wanted.append((f"{own['label'].iloc[0]}{note}", own.index[0], True))
+            wanted.append((f"{_short(own['label'].iloc[0])}{note}", own.index[0], True))
             continue
         others = [where[entry] for entry in points.index if entry not in own.index] or [np.zeros(2)]
         free = {entry: min(np.hypot(*(where[entry] - other)) for other in others) for entry in own.index}
-        wanted.append((f"{curve}{note}", max(free, key=lambda entry: free[entry]), True))
+        wanted.append((f"{_short(str(curve))}{note}", max(free, key=lambda entry: free[entry]), True))
         wanted += [(str(step), entry, False) for entry, step in own["step"].items() if step]
     made = [
         figure.text(
@@ -345,11 +361,11 @@ def _label(
     frame = axes.get_window_extent(renderer)
     bounds = Box(frame.x0 + scale, frame.y0 + scale, frame.x1 - scale, frame.y1 - scale)
     boxes = place(labels, obstacles, bounds, scale=scale)
+    complete = True
     for text, label, box, size in zip(made, labels, boxes, sizes, strict=True):
         if box is None:
             text.remove()
-            if label.required:
-                return False
+            complete &= not label.required
             continue
         # The window extent begins below the text's baseline by its descent, which differs from text to text.
         at = figure.transFigure.inverted().transform((box.left - size.x0, box.bottom - size.y0))
@@ -357,7 +373,7 @@ def _label(
         if needs_line(label, box, scale):
             ends = [(label.x, label.y), box.nearest(label.x, label.y)]
             _leader(figure, figure.transFigure.inverted().transform(ends))
-    return True
+    return complete
 
 
 def _leader(figure: Figure, ends: Any, colour: str = FAINT) -> None:
@@ -459,7 +475,13 @@ def best_settings(summary: Summary, track: str, part: str, metric: str) -> list[
 
 
 def _entry_name(summary: Summary, entry: Any) -> str:
-    return str(summary.entries.loc[entry, "label"])
+    return _short(str(summary.entries.loc[entry, "label"]))
+
+
+def _short(label: str) -> str:
+    """Cut what would fill a plot: its begin and its end tell settings of one method apart, the tables say all of it."""
+    label = printable(" ".join(label.split()))
+    return label if len(label) <= LONGEST_LABEL else f"{label[: LONGEST_LABEL - 20]} … {label[-17:]}"
 
 
 def _widest(figure: Figure, texts: Sequence[str]) -> float:
@@ -540,7 +562,7 @@ def stage_bars(source: ReportSource, summary: Summary, track: str, machine: str)
         axes.spines[["bottom", "left"]].set_visible(False)
         axes.set_yticks(range(len(times)), names if position == 0 else [], size=SMALL)
         axes.set_xticks([])
-        axes.set_title(column, size=SMALL, pad=3, loc="left")
+        axes.set_title(_short(column), size=SMALL, pad=3, loc="left")
         if column == "frame":
             for at, value in enumerate(total):
                 axes.text(0, at, number(float(value)), size=SMALL, va="center_baseline", weight="bold")

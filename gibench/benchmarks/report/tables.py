@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from gibench.benchmarks.report.csv_files import short_reason
 from gibench.benchmarks.report.source import PARTS, PREPARATION, ReportSource
 from gibench.benchmarks.report.summary import Summary
-from gibench.benchmarks.report.wording import MISSING, metric_title, number, seconds, size
+from gibench.benchmarks.report.wording import MISSING, metric_title, number, printable, seconds, size
 from gibench.datasets.files import write_whole
 from gibench.metrics import METRICS
 
@@ -51,7 +51,7 @@ class Table:
 
     def markdown(self) -> str:
         """Write it as GitHub-flavoured Markdown."""
-        lines = [self.caption, "", _pipes(self.head)]
+        lines = [_markdown(self.caption), "", _pipes(self.head)]
         lines.append(_pipes(["---"] * self.words + ["---:"] * (len(self.head) - self.words)))
         for name, rows in self.groups:
             for position, row in enumerate(rows):
@@ -281,7 +281,15 @@ def _directions(metrics: Sequence[str]) -> str:
 
 
 def _pipes(cells: Sequence[str]) -> str:
-    return "| " + " | ".join(cell.replace("|", "\\|").replace("\n", " ") for cell in cells) + " |"
+    return "| " + " | ".join(map(_markdown, cells)) + " |"
+
+
+_MARKDOWN = {**{sign: f"\\{sign}" for sign in "|\\`"}, "<": "&lt;", ">": "&gt;", "&": "&amp;"}
+"""What would end a cell, or be HTML to who shows the table. Stars are our own: the best of a column."""
+
+
+def _markdown(text: str) -> str:
+    return "".join(_MARKDOWN.get(sign, sign) for sign in " ".join(printable(text).split()))
 
 
 _TEX = {
@@ -297,4 +305,4 @@ _TEX = {
 
 
 def _tex(text: str) -> str:
-    return "".join(_TEX.get(sign, sign) for sign in text)
+    return "".join(_TEX.get(sign, sign) for sign in printable(text))

@@ -26,6 +26,13 @@ _TITLES = {
 MISSING = "–"
 
 
+def printable(text: str) -> str:
+    """Text of a file without what steers a terminal or turns the direction of reading; line breaks stay."""
+    return "".join(
+        sign if sign.isprintable() or sign == "\n" else "\N{REPLACEMENT CHARACTER}" for sign in text
+    )
+
+
 def metric_title(name: str) -> str:
     """Name a metric as its papers do."""
     return _TITLES.get(name, name)

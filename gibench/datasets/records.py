@@ -1,0 +1,126 @@
+"""What the JSON files of a dataset must hold before anything is made of them; see `gibench.datasets.checked`."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from gibench.datasets.checked import Amount, Checked, Count, Fingerprint
+
+Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
+RoomNumber = Annotated[str, Field(pattern=r"^[0-9]{1,9}$")]
+
+#: A file of a room from its folder. Whether it leads out of there is the gate's to say.
+FileName = Annotated[str, Field(min_length=1, max_length=1000)]
+
+
+class Versions(Checked):
+    """What the pixels were made by; all other packages are named beside."""
+
+    gibench: str
+    mitsuba: str
+
+
+class Totals(Checked):
+    """Sums over all rooms that are whole."""
+
+    rooms: Count
+    frames: Count
+    bytes: Count
+    frame_bytes: Count
+    paths: Count
+    invalid_paths: Count
+    kernel_seconds: Amount
+    median_error: Amount | None
+    splits: dict[str, Count]
+
+
+class Manifest(Checked):
+    """`dataset.json`. Its recipe has a model of its own."""
+
+    format: int
+    complete: bool
+    recipe: dict[str, Any]
+    identity: dict[str, Any]
+    licence: str
+    command: str
+    variant: str
+    versions: Versions
+    runs: list[dict[str, Any]]
+    rejected_rooms: dict[RoomNumber, str]
+    rejections: dict[str, Count] = Field(default_factory=dict)
+    totals: Totals | None = None
+
+
+class FrameRecord(Checked):
+    """A frame of a room."""
+
+    view: Count
+    file: Annotated[str, Field(pattern=r"^frames/[0-9]{4,6}\.exr$")]
+    sha256: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+    bytes: Count
+    camera: Vector
+    target: Vector
+    fov: float
+    path: str
+    step: Count
+    exposure: float | None
+    largest: float | None
+    spp: Count
+    paths: Count
+    invalid_paths: Count
+    median_error: float | None
+    kernel_seconds: Amount
+    denoise_seconds: Amount
+    seconds: Amount
+    seed: Count
+
+
+class Laps(Checked):
+    """Seconds that making a room took."""
+
+    build: Amount
+    write: Amount
+    load: Amount
+    render: Amount
+
+
+class RoomRecord(Checked):
+    """`frames.json` of a room."""
+
+    room: Count
+    kind: str
+    split: str
+    given_cameras: Annotated[int, Field(ge=0, le=10**6)] = 0
+    materials: list[str]
+    shapes: list[str]
+    rejections: dict[str, Count]
+    seconds: Laps
+    frames: list[FrameRecord]
+    files: dict[FileName, Fingerprint]
+
+
+class Change(Checked):
+    """Something that was done to an imported scene, as often as it was."""
+
+    rule: str
+    what: str
+    loss: bool
+    count: Count
+
+
+class Source(Checked):
+    """Where an imported scene came from."""
+
+    up: str
+    scale: float
+    warnings: list[str]
+    changes: list[Change]
+
+
+class Described(Checked):
+    """`room.json` of an imported scene, as far as `gibench dataset info` tells of it."""
+
+    kind: str
+    source: Source
