@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from gibench.cli.output import say
+
 
 def export(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="The dataset's folder.", show_default=False)],
@@ -32,4 +34,4 @@ def export(
         dataset = dataset.split(split)
     names = () if channels is None else resolve(names_in(channels, "--channels"))
     with counting("frames exported") as on_frame:
-        typer.echo(str(write(dataset, to, out, channels=names, tell=on_frame)))
+        say(str(write(dataset, to, out, channels=names, tell=on_frame)))

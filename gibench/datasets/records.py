@@ -22,6 +22,14 @@ class Versions(Checked):
     mitsuba: str
 
 
+class DenoiseChange(Checked):
+    """A frame of which denoising changed the mean of a part by a share."""
+
+    room: Count
+    view: Count
+    change: float
+
+
 class Totals(Checked):
     """Sums over all rooms that are whole."""
 
@@ -34,6 +42,7 @@ class Totals(Checked):
     kernel_seconds: Amount
     median_error: Amount | None
     splits: dict[str, Count]
+    denoise_changes: list[DenoiseChange] = Field(default_factory=list)
 
 
 class Manifest(Checked):

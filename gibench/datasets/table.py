@@ -33,6 +33,14 @@ LONGEST_TEXT = 1000
 #: How columns are written. Others multiply what is stored, such as strings as changes of the one before.
 ENCODINGS = {"PLAIN", "PLAIN_DICTIONARY", "RLE", "RLE_DICTIONARY", "BIT_PACKED"}
 
+#: Columns that every table has. What is not among them older tables lack, and is filled: NaN, "" or 0.
+ALWAYS = (
+    *("room", "view", "split", "kind", "file", "sha256", "bytes", "width", "height"),
+    *(f"{what}_{axis}" for what in ("camera", "target") for axis in "xyz"),
+    *("fov", "path", "step", "exposure", "largest", "spp", "paths", "invalid_paths", "median_error"),
+    *("kernel_seconds", "denoise_seconds", "seconds", "seed"),
+)
+
 FILE = r"rooms/[0-9]{6,9}/frames/[0-9]{4,6}\.exr"
 
 
@@ -58,7 +66,8 @@ def _read(path: Path) -> pd.DataFrame:
     import pyarrow.compute as pc
     import pyarrow.parquet as pq
 
-    texts = [name for name, dtype in COLUMNS.items() if dtype == "str"]
+    there = pq.read_schema(path).names
+    texts = [name for name, dtype in COLUMNS.items() if dtype == "str" and name in there]
     # As dictionaries, so that a long text that stands in every row is looked at once.
     with pq.ParquetFile(path, read_dictionary=texts) as file:
         for name, column in zip(texts, file.read(columns=texts).columns, strict=True):
@@ -66,7 +75,11 @@ def _read(path: Path) -> pd.DataFrame:
                 longest = pc.max(pc.binary_length(chunk.dictionary)).as_py() or 0
                 if longest > LONGEST_TEXT:
                     raise ValueError(f"column {name} holds a text of {longest} bytes")
-    return pd.read_parquet(path)
+    frames = pd.read_parquet(path)
+    for name, dtype in COLUMNS.items():
+        if name not in there:
+            frames[name] = pd.Series({"str": "", "int64": 0, "float64": math.nan}[dtype], frames.index, dtype)
+    return frames[[*COLUMNS, *(name for name in there if name not in COLUMNS)]]
 
 
 def _footer_problems(root: Path, path: Path, recipe: Recipe) -> Iterator[str]:
@@ -77,9 +90,12 @@ def _footer_problems(root: Path, path: Path, recipe: Recipe) -> Iterator[str]:
     names = list(schema.names)
     if len(set(names)) < len(names) or len(names) > 1000:
         yield "its columns are not told apart"
-    for name in COLUMNS.keys() - set(names):
-        yield f"it has no column {name}"
+    for name in ALWAYS:
+        if name not in names:
+            yield f"it has no column {name}"
     for name, dtype in COLUMNS.items():
+        if name not in names:
+            continue
         there = str(schema.field(name).type)
         if (
             there.removeprefix("large_")

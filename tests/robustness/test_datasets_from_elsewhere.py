@@ -7,6 +7,7 @@ import os
 import struct
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import OpenEXR
@@ -15,6 +16,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from gibench import cli
 from gibench.cli import run as command
 from gibench.cli.app import app
 from gibench.datasets import open_dataset
@@ -306,3 +308,17 @@ def test_output_to_a_full_disk_and_to_nobody(ds):
     result = subprocess.run(words, stdout=writer, stderr=subprocess.PIPE, text=True, check=False)
     os.close(writer)
     assert result.stderr == ""
+
+
+def test_commands_print_through_one_door():
+    for path in Path(cli.__file__).parent.glob("*.py"):
+        assert path.name == "output.py" or "typer.echo" not in path.read_text(), (
+            f"{path.name}: use output.say"
+        )
+
+
+def test_columns_of_later_versions_are_filled(ds):
+    table = pd.read_parquet(ds / "frames.parquet").drop(columns="denoise_change")
+    table.to_parquet(ds / "frames.parquet", index=False)
+    assert open_dataset(ds).frames["denoise_change"].isna().all()
+    assert verify(ds) == []
