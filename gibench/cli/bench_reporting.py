@@ -5,8 +5,7 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
-import typer
-
+from gibench.cli.output import say
 from gibench.errors import GibenchError
 
 
@@ -28,19 +27,19 @@ def write_and_tell(results: Path, out: Path | None, archive: Path | None) -> Non
                 raise TrackError(
                     f"{results} is a packed report: name a new folder for it with --out, and no --archive"
                 )
-            typer.echo(str(unpack(results, out)))
+            say(str(unpack(results, out)))
             return
         if out is None and archive is None:
             raise TrackError("name a folder with --out, or a file with --archive, or both")
         loaded = load(results)
         if out is not None:
             write_report(loaded, out)
-            typer.echo(str(out / "index.html"))
+            say(str(out / "index.html"))
         if archive is not None:
             with tempfile.TemporaryDirectory() as scratch:
                 if out is None:
                     write_report(loaded, Path(scratch) / "report")
-                typer.echo(str(pack(out or Path(scratch) / "report", archive)))
+                say(str(pack(out or Path(scratch) / "report", archive)))
     except OSError as problem:
         where = problem.filename or out or archive
         raise GibenchError(f"{where} cannot be written: {problem.strerror}") from None
