@@ -7,7 +7,7 @@ published is what was rendered.
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
@@ -21,7 +21,7 @@ from gibench.generators.light_shapes import LAMP_MATERIAL, light_matrix
 from gibench.generators.materials import bsdf_xml, tile_size
 from gibench.generators.outside import GROUND, ground_element
 from gibench.generators.panorama import write_panorama
-from gibench.generators.parts import Camera, Environment, Light, Mesh, Room, Texture
+from gibench.generators.parts import Camera, Environment, FloatArray, Light, Mesh, Room, Texture
 from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.scene import OPENINGS
 
@@ -68,12 +68,24 @@ def write_ply(mesh: Mesh, path: Path, *, tile: tuple[float, float] = (1.0, 1.0))
     path.write_bytes(ply_bytes(mesh, tile=tile))
 
 
-def ply_bytes(mesh: Mesh, *, tile: tuple[float, float] = (1.0, 1.0)) -> bytes:
+def ply_bytes(
+    mesh: Mesh,
+    *,
+    tile: tuple[float, float] = (1.0, 1.0),
+    vertex_attributes: Mapping[str, FloatArray] | None = None,
+    face_attributes: Mapping[str, FloatArray] | None = None,
+) -> bytes:
     """A mesh as binary little-endian PLY with float32 positions, normals and UVs, where it has these.
 
     tile: metres that the texture's tile covers; UVs are divided by it. Scaling them here rather than by a transform
     of each texture keeps materials alike, so that Dr.Jit compiles one kernel for them all, and for the next room.
+    vertex_attributes, face_attributes: (N, C) by name; Mitsuba calls them vertex_NAME and face_NAME.
     """
+    of_vertices, of_faces = vertex_attributes or {}, face_attributes or {}
+
+    def named(attributes: Mapping[str, FloatArray]) -> list[str]:
+        return [f"{name}_{k}" for name, values in attributes.items() for k in range(values.shape[1])]
+
     columns = {"x y z": mesh.vertices, "nx ny nz": mesh.normals, "u v": mesh.uvs / tile}
     columns = {names: values for names, values in columns.items() if len(values) == len(mesh.vertices)}
     lines = [
@@ -81,13 +93,19 @@ def ply_bytes(mesh: Mesh, *, tile: tuple[float, float] = (1.0, 1.0)) -> bytes:
         "format binary_little_endian 1.0",
         f"element vertex {len(mesh.vertices)}",
         *(f"property float {name}" for names in columns for name in names.split()),
+        *(f"property float {name}" for name in named(of_vertices)),
         f"element face {len(mesh.faces)}",
         "property list uchar int vertex_indices",
+        *(f"property float {name}" for name in named(of_faces)),
         "end_header\n",
     ]
-    faces = np.empty(len(mesh.faces), dtype=[("count", "u1"), ("corners", "<i4", 3)])
+    count = sum(values.shape[1] for values in of_faces.values())
+    extra = [("attributes", "<f4", count)] if count else []
+    faces = np.empty(len(mesh.faces), dtype=[("count", "u1"), ("corners", "<i4", 3), *extra])
     faces["count"], faces["corners"] = 3, mesh.faces
-    vertices = np.concatenate(list(columns.values()), 1, dtype="<f4", casting="same_kind")
+    if count:
+        faces["attributes"] = np.concatenate(list(of_faces.values()), 1).reshape(faces["attributes"].shape)
+    vertices = np.concatenate([*columns.values(), *of_vertices.values()], 1, dtype="<f4", casting="same_kind")
     return "\n".join(lines).encode("ascii") + vertices.tobytes() + faces.tobytes()
 
 

@@ -6,14 +6,15 @@ What only mirrors or refracts, and every lamp, stays the exact shape that it is.
 from __future__ import annotations
 
 import math
-import re
+from dataclasses import replace
 
 import numpy as np
 
+from gibench.generators.imported.changes import Note
 from gibench.generators.imported.errors import SceneFileError
-from gibench.generators.imported.reading import Node, SceneTree, new
-from gibench.generators.imported.transforms import numbers, triple
-from gibench.generators.imported.upgrading.rules import Note
+from gibench.generators.imported.reading import SceneTree
+from gibench.generators.imported.transforms import matrix_of, numbers, triple
+from gibench.generators.imported.tree import Node, new
 from gibench.generators.parts import FloatArray, IntArray, Mesh
 from gibench.generators.scene_files import ply_bytes
 
@@ -37,15 +38,26 @@ def mesh_shapes(tree: SceneTree, note: Note) -> None:
         if make is None or node.nodes("emitter") or not _is_diffuse(node, by_id):
             continue
         mesh = make(node)
-        plain = re.sub(r"[^\w.-]", "_", node.get("id", ""))
-        name = f"{plain}.{len(tree.made)}.ply"
-        tree.made[name] = ply_bytes(mesh)
+        if np.linalg.det(matrix_of(node.property("to_world"))[:3, :3]) < 0:
+            mesh = _mirrored(node.type, mesh)
+        name = tree.make(node.get("id", ""), ".ply", ply_bytes(mesh))
         note(node, f"a {node.type} is a mesh", loss=True)
         for gone in ("center", "radius", "p0", "p1"):
             if (part := node.property(gone)) is not None:
                 node.remove(part)
         node.set("type", "ply")
         node.insert(0, new("string", node, name="filename", value=name))
+
+
+def _mirrored(kind: str, mesh: Mesh) -> Mesh:
+    """A mesh that a mirroring transformation follows, made so that it faces where Mitsuba's own shape does.
+
+    A mirror image of triangles is wound the other way. Of a sphere Mitsuba turns the normals inward too; a disk's and a
+    cylinder's stay on the side that they were on.
+    """
+    if kind == "sphere":
+        return replace(mesh, normals=-mesh.normals)
+    return replace(mesh, faces=mesh.faces[:, ::-1].copy())
 
 
 def _is_diffuse(shape: Node, by_id: dict[str, Node]) -> bool:

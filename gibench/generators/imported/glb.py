@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 
 from gibench.generators.glb import GlbDocument
-from gibench.generators.imported.reading import Node
+from gibench.generators.imported.images import as_png
 from gibench.generators.imported.scene import ImportedScene
+from gibench.generators.imported.tree import Node
 
-MIMES = {b"\x89PNG": "image/png", b"\xff\xd8\xff\xe0": "image/jpeg", b"\xff\xd8\xff\xe1": "image/jpeg"}
-"""Of the images that glTF may hold, by their first bytes."""
+MIMES = {b"\x89PNG": "image/png", b"\xff\xd8\xff": "image/jpeg"}
+"""Of the images that glTF may hold, by their first bytes; others are converted."""
 
 COLORS = ("reflectance", "diffuse_reflectance", "base_color", "specular_reflectance")
 GREY = (0.5, 0.5, 0.5)
@@ -86,6 +87,10 @@ def _material(
             surface["roughnessFactor"] = min(1.0, math.sqrt(max(0.0, float(part.get("value", "1")))))
         elif part.type in ("conductor", "plastic"):
             surface["roughnessFactor"] = 0.0
+        elif part.type == "principled":
+            # glTF's own words, and glTF's own roughness: the root of alpha.
+            surface["metallicFactor"] = _factor(part, "metallic", 0.0)
+            surface["roughnessFactor"] = _factor(part, "roughness", 0.5)
     material: dict[str, Any] = {
         "name": "" if bsdf is None else bsdf.get("id", ""),
         "pbrMetallicRoughness": surface,
@@ -104,6 +109,13 @@ def _material(
     if emits:
         material["emissiveFactor"] = [1.0, 1.0, 1.0]
     return material
+
+
+def _factor(bsdf: Node, name: str, default: float) -> float:
+    """A constant property of a material in [0, 1]; the mean of glTF's range where it is a texture."""
+    part = bsdf.property(name)
+    constant = (default,) if part is None else _constant(part)
+    return 0.5 if constant is None else sum(constant) / len(constant)
 
 
 def _constant(color: Node) -> tuple[float, ...] | None:
@@ -125,6 +137,6 @@ def _texture(
         content = scene.tree.content(path)
         mime = next((mime for start, mime in MIMES.items() if content.startswith(start)), None)
         if mime is None:
-            return None
+            content, mime = as_png(content), "image/png"
         images[path] = document.image(content, mime)
     return images[path]

@@ -8,7 +8,8 @@ one shape with one of them the wrong way round, so each connected piece of a mes
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import enum
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -17,11 +18,11 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from gibench.generators.imported.reading import Node
+from gibench.generators.imported.changes import Change
 from gibench.generators.imported.scene import ImportedScene
 from gibench.generators.imported.survey import hits
+from gibench.generators.imported.tree import Node, copied, new, replaced
 from gibench.generators.imported.turning import with_meshes_turned
-from gibench.generators.imported.upgrading.rules import Change
 from gibench.generators.parts import FloatArray
 from gibench.rendering.free_space import NoFreeSpace, free_space, sphere
 from gibench.rendering.scene import Scene
@@ -42,6 +43,12 @@ ONE_SIDED = (
     "hair",
 )
 """Materials to which it matters which side they are seen from."""
+
+BUMPS = ("bumpmap", "normalmap")
+"""Dents that would be bulges from behind: the axes that they are given in turn with the surface."""
+
+CURVES = ("linearcurve", "bsplinecurve", "sdfgrid", "ellipsoids", "ellipsoidsmesh")
+"""Shapes whose normals Mitsuba cannot flip."""
 
 
 RULE, WHAT = "orientation", "what of a shape turned its back to the room is turned round"
@@ -72,7 +79,12 @@ def turned_round(scene: ImportedScene, wrong: Mapping[str, NDArray[np.bool_]]) -
     wrong: as `with_meshes_turned` takes it.
     """
     by_id = {node.get("id", ""): node for node in scene.tree.root.everything() if node.tag != "ref"}
-    chosen = {name: faces for name, faces in wrong.items() if _is_two_sided(by_id[name], by_id)}
+    how = {name: sides(by_id[name], by_id) for name in wrong}
+    chosen = {
+        name: faces
+        for name, faces in wrong.items()
+        if how[name] is Sides.ALIKE or (how[name] is Sides.EXCHANGED and faces.all())
+    }
     if not chosen:
         return scene
     # Turned twice is as it was.
@@ -81,7 +93,9 @@ def turned_round(scene: ImportedScene, wrong: Mapping[str, NDArray[np.bool_]]) -
     places |= {by_id[name].where for name, faces in chosen.items() if not faces.all()}
     others = tuple(change for change in scene.changes if change.rule != RULE)
     changes = (*others, *(Change(RULE, WHAT, where) for where in sorted(places)))
-    return replace(with_meshes_turned(scene, chosen), changes=changes)
+    turned = with_meshes_turned(scene, chosen)
+    exchanged(turned.tree.root, [name for name in chosen if how[name] is Sides.EXCHANGED])
+    return replace(turned, changes=changes)
 
 
 def inverted(scene: Scene, found: FloatArray) -> dict[str, NDArray[np.bool_]]:
@@ -154,11 +168,76 @@ def pieces(vertices: NDArray[Any], faces: NDArray[Any]) -> NDArray[np.int64]:
     return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
 
 
-def _is_two_sided(shape: Node, by_id: dict[str, Node]) -> bool:
-    if shape.nodes("emitter"):
-        return False
-    bsdfs = shape.nodes("bsdf") + [
-        by_id[ref.get("id", "")] for ref in shape.nodes("ref") if by_id[ref.get("id", "")].tag == "bsdf"
+class Sides(enum.Enum):
+    """What turning a surface round does to how it looks."""
+
+    ALIKE, EXCHANGED, DIFFERENT = range(3)
+
+
+def sides(shape: Node, by_id: Mapping[str, Node]) -> Sides:
+    """Whether both sides of a shape look alike, look so once two materials of a `twosided` are exchanged, or do not."""
+    if shape.nodes("emitter") or shape.type in CURVES:
+        return Sides.DIFFERENT
+    found = [_sides_of(part, by_id, (), within=False) for part in _materials(shape, by_id)]
+    return max(found, key=lambda side: side.value, default=Sides.DIFFERENT)
+
+
+def _materials(node: Node, by_id: Mapping[str, Node]) -> list[Node]:
+    """The materials in a shape or material, references followed."""
+    targets = [
+        part if part.tag == "bsdf" else by_id[part.get("id", "")] for part in node.nodes("bsdf", "ref")
     ]
-    parts = [part.type for bsdf in bsdfs for part in bsdf.everything() if part.tag == "bsdf"]
-    return "twosided" in parts and not any(part in ONE_SIDED for part in parts)
+    return [target for target in targets if target.tag == "bsdf"]
+
+
+def _sides_of(bsdf: Node, by_id: Mapping[str, Node], above: tuple[int, ...], *, within: bool) -> Sides:
+    """within: inside of a `twosided`."""
+    if id(bsdf) in above or bsdf.type in ONE_SIDED or bsdf.type in BUMPS:
+        return Sides.DIFFERENT
+    parts = _materials(bsdf, by_id)
+    two_sided = within or bsdf.type == "twosided"
+    inner = [_sides_of(part, by_id, (*above, id(bsdf)), within=two_sided) for part in parts]
+    if not parts:
+        return Sides.ALIKE if within or bsdf.type == "null" else Sides.DIFFERENT
+    if bsdf.type == "twosided" and len(parts) == 2 and parts[0] is not parts[1]:
+        inner.append(Sides.EXCHANGED)
+    return max(inner, key=lambda side: side.value)
+
+
+def exchanged(root: Node, names: Iterable[str]) -> None:
+    """Exchange the two materials of every `twosided` of these shapes, in place; others that share them keep theirs."""
+    by_id = {node.get("id", ""): node for node in root.everything() if node.tag != "ref"}
+    made: dict[str, Node] = {}
+    for shape in [by_id[name] for name in names]:
+        for part in shape.nodes("bsdf", "ref"):
+            target = part if part.tag == "bsdf" else by_id[part.get("id", "")]
+            if target.tag != "bsdf":
+                continue
+            name = target.get("id", "")
+            if name not in made:
+                made[name] = _exchanged(target, by_id)
+                fresh = f"{name}.turned"
+                while fresh in by_id:
+                    fresh += "."
+                made[name].set("id", fresh)
+                root.insert(0, made[name])
+            replaced(shape, part, new("ref", part, id=made[name].get("id", "")))
+
+
+def _exchanged(bsdf: Node, by_id: Mapping[str, Node]) -> Node:
+    copy = new("bsdf", bsdf, **{key: value for key, value in bsdf.attrib.items() if key != "id"})
+    for part in bsdf.nodes():
+        target = by_id[part.get("id", "")] if part.tag == "ref" else part
+        if target.tag != "bsdf":
+            copy.append(copied(part))
+            continue
+        inner = _exchanged(target, by_id)
+        if part.get("name"):
+            inner.set("name", part.get("name", ""))
+        copy.append(inner)
+    if copy.type == "twosided":
+        inside = copy.nodes("bsdf")
+        for part in inside:
+            copy.remove(part)
+        copy.extend(reversed(inside))
+    return copy

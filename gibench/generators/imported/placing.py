@@ -11,8 +11,8 @@ import math
 import numpy as np
 
 from gibench.generators.imported.errors import SceneFileError
-from gibench.generators.imported.reading import Node, new
-from gibench.generators.imported.transforms import matrix_of, triple
+from gibench.generators.imported.transforms import matrix_of, numbers, triple
+from gibench.generators.imported.tree import Node, new
 from gibench.generators.parts import FloatArray
 
 AXES = ("x", "y", "z")
@@ -50,7 +50,7 @@ def _camera_up(transform: Node | None) -> FloatArray:
     steps = transform.nodes() if transform is not None else []
     if len(steps) == 1 and steps[0].tag == "lookat" and steps[0].get("up"):
         # What its author meant, even where the camera looks steeply down.
-        return np.array([float(word) for word in steps[0].get("up", "").replace(",", " ").split()])
+        return numbers(steps[0], steps[0].get("up", ""), 3)
     return matrix_of(transform)[:3, 1]
 
 
@@ -93,13 +93,19 @@ def _place_light(node: Node, matrix: FloatArray, turn: FloatArray, scale: float)
     placed_by_vector = node.property("direction", "position") is not None
     if node.property("to_world") is not None or not placed_by_vector:
         _append(node, turn if node.type in DIRECTIONAL else matrix)
+    if node.type == "projector" and scale != 1:
+        own = node.property("scale")
+        before = 1.0 if own is None else float(numbers(own, own.get("value", ""), 1)[0])
+        if own is not None:
+            node.remove(own)
+        node.append(new("float", node, name="scale", value=repr(before * scale**2)))
     intensity = node.property("intensity")
     if node.type in INTENSITIES and scale != 1:
         if intensity is None:
             node.append(new("rgb", node, name="intensity", value=repr(scale**2)))
         elif intensity.tag in ("rgb", "float"):
-            values = [float(word) * scale**2 for word in intensity.get("value", "").replace(",", " ").split()]
-            intensity.set("value", " ".join(map(repr, values)))
+            values = numbers(intensity, intensity.get("value", ""), 1, 3) * scale**2
+            intensity.set("value", " ".join(map(repr, values.tolist())))
         else:
             raise SceneFileError(
                 f"{intensity.where}: the intensity of a {node.type} light is a <{intensity.tag}>, which cannot be "

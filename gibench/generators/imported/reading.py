@@ -1,71 +1,24 @@
-"""Scene files as trees: parsed so that a file from the web can do no harm, includes and defaults resolved.
+"""Scene files with all that they include, their parameters filled in.
 
 A scene file may include others, and names meshes and images. None of them may lie outside the scene's folder unless the
-user allows it. Document type declarations are refused altogether: scenes have none, and entities are what XML bombs are
-made of.
+user allows it (`locating`).
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from xml.etree.ElementTree import Element
-from xml.parsers import expat
 
+from gibench.generators.imported import locating
+from gibench.generators.imported.changes import Change
 from gibench.generators.imported.errors import SceneFileError
+from gibench.generators.imported.parsing import DEEPEST, Budget, parsed
+from gibench.generators.imported.tree import Node
 
-DEEPEST = 100
-"""Of elements in one another, and of includes: Mitsuba's own scenes have about ten."""
-
-PLUGINS = frozenset(
-    {"bsdf", "emitter", "film", "integrator", "medium", "phase", "rfilter", "sampler", "sensor", "shape"}
-) | {"spectrum", "subsurface", "texture", "volume"}
-"""Tags of elements that are plugins; their type names which."""
-
-
-class Node(Element):
-    """An element that knows where it stands. where: "scene.xml:12"."""
-
-    where = ""
-
-    @property
-    def type(self) -> str:
-        """Name of the plugin, empty where the element is none."""
-        return self.get("type", "")
-
-    def property(self, *names: str) -> Node | None:
-        """The first child of one of these names."""
-        return next((child for child in self.nodes() if child.get("name") in names), None)
-
-    def value(self, name: str, default: str = "") -> str:
-        """The value of the child of that name."""
-        child = self.property(name)
-        return default if child is None else child.get("value", default)
-
-    def nodes(self, *tags: str) -> list[Node]:
-        """Children with one of these tags, or all of them."""
-        return [child for child in self if isinstance(child, Node) and (not tags or child.tag in tags)]
-
-    def everything(self) -> Iterator[Node]:
-        """This element and all below it, in the order of the file."""
-        return (node for node in self.iter() if isinstance(node, Node))
-
-
-def new(tag: str, like: Node, **attributes: str) -> Node:
-    """An element that stands in the file where another does."""
-    node = Node(tag, attributes)
-    node.where = like.where
-    return node
-
-
-def copied(node: Node) -> Node:
-    """A copy of an element and all below it."""
-    copy = Node(node.tag, dict(node.attrib))
-    copy.where = node.where
-    copy[:] = [copied(child) for child in node.nodes()]
-    return copy
+REPLACED = {"integrator": "path", "sampler": "independent", "rfilter": "box", "film": "hdrfilm"}
+"""Elements that gibench has its own of, so that a parameter without a value does no harm in them; and their types."""
 
 
 @dataclass(frozen=True)
@@ -74,6 +27,7 @@ class SceneTree:
 
     root: its `<scene>`. file: where it came from. allow_outside: whether files may lie outside its folder. searched:
     more folders that files are looked for in. made: content of files that were made during the import, by name.
+    changes: what was done while it was read. unused: parameters that were given and that nothing asks for.
     """
 
     root: Node
@@ -81,6 +35,8 @@ class SceneTree:
     allow_outside: bool = False
     searched: list[Path] = field(default_factory=list)
     made: dict[str, bytes] = field(default_factory=dict)
+    changes: list[Change] = field(default_factory=list)
+    unused: set[str] = field(default_factory=set)
 
     @property
     def folder(self) -> Path:
@@ -96,127 +52,142 @@ class SceneTree:
         return self.made[source] if isinstance(source, str) else source.read_bytes()
 
     def located(self, name: str, where: str) -> Path:
-        """Where a file that the scene names lies, whether it is there or not.
+        """As `locating.located`, in the folders of this scene."""
+        return locating.located(name, where, (self.folder, *self.searched), allow_outside=self.allow_outside)
 
-        Raises SceneFileError where that is outside the scene's folder and not allowed.
+    def make(self, stem: str, ending: str, content: bytes) -> str:
+        """Keep a file that was made during the import; its name, which no other has.
+
+        stem: what the name begins with, of any letters; ending: what it ends with, such as ".turned.ply".
         """
-        # Windows' separators are common in old scenes; no file of such a scene has one in its name.
-        name = name.strip().replace("\\", "/")
-        candidates = [folder / name for folder in (self.folder, *self.searched)]
-        path = next((c for c in candidates if c.is_file()), candidates[0])
-        inside = path.resolve().is_relative_to(self.folder.resolve())
-        if not inside and not self.allow_outside:
-            raise SceneFileError(
-                f"{where}: '{name}' lies outside the folder of the scene: move it inside, or allow it with "
-                "--allow-outside if you trust the file"
-            )
-        return path
+        plain = re.sub(r"[^A-Za-z0-9_.-]", "_", stem)[:100]
+        taken = {name.lower() for name in self.made}
+        name, number = f"{plain}{ending}", 1
+        while name.lower() in taken:
+            number += 1
+            name = f"{plain}-{number}{ending}"
+        self.made[name] = content
+        return name
 
 
-def read_tree(file: Path, *, allow_outside: bool = False) -> SceneTree:
-    """Read a scene file and all that it includes, with `<default>` values filled in.
+def read_tree(
+    file: Path, *, allow_outside: bool = False, parameters: Mapping[str, str] | None = None
+) -> SceneTree:
+    """Read a scene file and all that it includes, with parameters filled in.
 
-    Raises SceneFileError for a file that cannot be read or is no scene, a cyclic include, an undefined `$parameter`.
+    parameters: values that count before any `<default>`. Raises SceneFileError for a file that cannot be read or is no
+    scene, a cyclic include, an undefined `$parameter`.
     """
-    root = _parsed(file, file.name)
+    budget = Budget()
+    root = parsed(file, file.name, budget)
     if root.tag != "scene":
         raise SceneFileError(f"{file}: it is XML, but no Mitsuba scene: its first element is <{root.tag}>")
-    tree = SceneTree(root, file, allow_outside)
-    _include(tree, root, (file.resolve(),))
-    _fill_in(tree)
+    tree = SceneTree(root, file, allow_outside, unused=set(parameters or {}))
+    reader = _Reader(tree, budget, dict(parameters or {}))
+    reader.include(root, (file.resolve(),))
+    reader.fill(root, replaced=False)
     return tree
 
 
-def _parsed(file: Path, name: str) -> Node:
-    try:
-        content = file.read_bytes()
-    except OSError as problem:
-        raise SceneFileError(f"scene file {file} cannot be read: {problem.strerror}") from None
-    parser = expat.ParserCreate()
-    stack: list[Node] = []
-    roots: list[Node] = []
-
-    def refuse(*_: object) -> None:
-        raise SceneFileError(
-            f"{name}:{parser.CurrentLineNumber}: it has a document type declaration, which scenes do not need "
-            "and which can make a small file expand without end: remove <!DOCTYPE …>"
-        )
-
-    def start(tag: str, attributes: dict[str, str]) -> None:
-        node = Node(tag, attributes)
-        node.where = f"{name}:{parser.CurrentLineNumber}"
-        if len(stack) >= DEEPEST:
-            raise SceneFileError(
-                f"{node.where}: more than {DEEPEST} elements in one another: no scene needs that"
-            )
-        if stack:
-            stack[-1].append(node)
-        else:
-            roots.append(node)
-        stack.append(node)
-
-    parser.StartDoctypeDeclHandler = refuse
-    parser.StartElementHandler = start
-    parser.EndElementHandler = lambda tag: stack.pop()
-    try:
-        parser.Parse(content, True)
-    except expat.ExpatError as problem:
-        raise SceneFileError(
-            f"{file}: it is no XML: {expat.ErrorString(problem.code)} in line {problem.lineno}"
-        ) from None
-    return roots[0]
+_PARAMETER = re.compile(r"\$(?:\{(\w+)\}|(\w+))")
 
 
-def _include(tree: SceneTree, node: Node, open_files: tuple[Path, ...]) -> None:
-    """Put what is included in the place of `<include>`, and note the folders of `<path>`."""
-    children: list[Node] = []
-    for child in node.nodes():
-        if child.tag == "path":
-            folder = tree.folder / child.get("value", "")
-            if not tree.allow_outside and not folder.resolve().is_relative_to(tree.folder.resolve()):
-                raise SceneFileError(
-                    f"{child.where}: <path> leads outside the folder of the scene: allow it with --allow-outside"
-                )
-            tree.searched.append(folder)
-        elif child.tag == "include":
-            path = tree.located(child.get("filename", ""), child.where)
-            if path.resolve() in open_files:
-                raise SceneFileError(f"{child.where}: '{path.name}' includes itself: remove this <include>")
-            if len(open_files) > DEEPEST:
-                raise SceneFileError(f"{child.where}: more than {DEEPEST} includes in one another")
-            included = _parsed(path, path.name)
-            _include(tree, included, (*open_files, path.resolve()))
-            children += included.nodes() if included.tag == "scene" else [included]
-        else:
-            _include(tree, child, open_files)
-            children.append(child)
-    node[:] = children
+class _Undefined(Exception):
+    """A parameter without a value."""
 
 
-_PARAMETER = re.compile(r"\$\{?(\w+)\}?")
+@dataclass
+class _Reader:
+    tree: SceneTree
+    budget: Budget
+    values: dict[str, str]
 
+    def include(self, node: Node, open_files: tuple[Path, ...]) -> None:
+        """Put what is included in the place of `<include>`, note the folders of `<path>` and the values of `<default>`.
 
-def _fill_in(tree: SceneTree) -> None:
-    """Replace `$name` by the `<default>` of that name, longest names first, as Mitsuba does."""
-    defaults = {
-        node.get("name", ""): node.get("value", "")
-        for node in tree.root.everything()
-        if node.tag == "default"
-    }
-    for node in tree.root.everything():
-        node[:] = [child for child in node if child.tag != "default"]
-        for key, text in node.attrib.items():
-            if "$" not in text:
-                continue
-
-            def filled(match: re.Match[str], node: Node = node) -> str:
-                name = next(
-                    (n for n in sorted(defaults, key=len, reverse=True) if match[1].startswith(n)), None
-                )
-                if not name:
+        In the order of the file, as Mitsuba does: the first `<default>` of a name counts, and may use those before it.
+        """
+        children: list[Node] = []
+        for child in node.nodes():
+            if child.tag == "default":
+                name = child.get("name", "")
+                if name and name not in self.values:
+                    self.values[name] = self._text(child, "value")
+            elif child.tag == "path":
+                folder = self.tree.folder / self._text(child, "value").replace("\\", "/")
+                if not self.tree.allow_outside and not locating.is_inside(folder, self.tree.folder):
                     raise SceneFileError(
-                        f"{node.where}: ${match[1]} has no value: add <default name=… value=…/>"
+                        f"{child.where}: <path> leads outside the folder of the scene: allow it with --allow-outside"
                     )
-                return defaults[name] + match[1][len(name) :]
+                self.tree.searched.append(folder)
+            elif child.tag == "include":
+                children += self._included(child, open_files)
+            else:
+                self.include(child, open_files)
+                children.append(child)
+        node[:] = children
 
-            node.set(key, _PARAMETER.sub(filled, text))
+    def _included(self, child: Node, open_files: tuple[Path, ...]) -> list[Node]:
+        self.budget.include(child.where)
+        path = self.tree.located(self._text(child, "filename"), child.where)
+        if path.resolve() in open_files:
+            raise SceneFileError(f"{child.where}: '{path.name}' includes itself: remove this <include>")
+        if len(open_files) > DEEPEST:
+            raise SceneFileError(f"{child.where}: more than {DEEPEST} includes in one another")
+        if not path.is_file():
+            raise SceneFileError(f"{child.where}: the included file '{path.name}' is missing: get it")
+        included = parsed(path, path.name, self.budget, legacy=child.legacy)
+        self.include(included, (*open_files, path.resolve()))
+        return included.nodes() if included.tag == "scene" else [included]
+
+    def fill(self, node: Node, *, replaced: bool) -> None:
+        """Replace `$name` by its value in all attributes."""
+        for child in node.nodes():
+            within = replaced or child.tag in REPLACED
+            try:
+                for key, text in child.attrib.items():
+                    if "$" in text:
+                        child.set(key, self._filled(child, text))
+            except _Undefined as undefined:
+                if not within:
+                    raise SceneFileError(
+                        f"{child.where}: ${undefined} has no value: add <default name=… value=…/>, or give one with "
+                        f"-D {undefined}=…"
+                    ) from None
+                if key != "type" or child.tag not in REPLACED:
+                    self._drop(node, child, str(undefined))
+                    continue
+                child.set("type", REPLACED[child.tag])
+                what = f"${undefined} has no value, so the {child.tag} is {child.type}"
+                self.tree.changes.append(Change("parameters", what, child.where))
+            self.fill(child, replaced=within)
+
+    def _drop(self, parent: Node, child: Node, name: str) -> None:
+        what = (
+            f"${name} has no value, so the {child.get('name') or child.tag} of the {parent.tag} is left out"
+        )
+        self.tree.changes.append(Change("parameters", what, child.where))
+        parent.remove(child)
+
+    def _text(self, node: Node, key: str) -> str:
+        try:
+            return self._filled(node, node.get(key, ""))
+        except _Undefined as undefined:
+            raise SceneFileError(
+                f"{node.where}: ${undefined} has no value here: put its <default> before, or give one with "
+                f"-D {undefined}=…"
+            ) from None
+
+    def _filled(self, node: Node, text: str) -> str:
+        parts, at = [], 0
+        for match in _PARAMETER.finditer(text):
+            word = match[1] or match[2]
+            # The longest name that fits, as Mitsuba does.
+            name = next((word[:n] for n in range(len(word), 0, -1) if word[:n] in self.values), None)
+            if name is None:
+                raise _Undefined(word)
+            self.tree.unused.discard(name)
+            self.budget.expand(len(self.values[name]), node.where)
+            parts += [text[at : match.start()], self.values[name], word[len(name) :]]
+            at = match.end()
+        return "".join([*parts, text[at:]])

@@ -7,11 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
+from gibench.generators.imported.changes import Change
 from gibench.generators.imported.errors import SceneFileError
 from gibench.generators.imported.files import destinations
-from gibench.generators.imported.reading import Node, copied, new
 from gibench.generators.imported.scene import ImportedScene
-from gibench.generators.imported.upgrading.rules import Change
+from gibench.generators.imported.tree import Node, copied, new
 from gibench.generators.light_shapes import LAMP_MATERIAL
 from gibench.generators.panorama import write_panorama
 from gibench.generators.parts import Environment, Light

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+import math
 import shutil
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import ElementTree, SubElement, indent
@@ -15,13 +16,15 @@ import numpy as np
 
 from gibench import gate
 from gibench.generators.cameras import NoView, sample_path, sample_stills
+from gibench.generators.imported.changes import Change
 from gibench.generators.imported.errors import SceneFileError
 from gibench.generators.imported.glb import write_scene_glb
 from gibench.generators.imported.placing import placed_matrix
-from gibench.generators.imported.reading import Node
 from gibench.generators.imported.scene import ImportedScene
+from gibench.generators.imported.tree import Node
 from gibench.generators.parts import Camera, FloatArray
 from gibench.generators.scene_files import camera_records, sensor_element
+from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.scene import OPENINGS
 
 STILLS, PATH = 3000, 3001
@@ -81,6 +84,7 @@ def import_room(
         except NoFreeSpace as problem:
             why_none = str(problem)
     scene = without_flips(scene)
+    scene = _near_planes_told(scene, resolution)
     openings = find_openings(scene.loaded, found) if len(found) else np.zeros((0, 3, 3))
     cameras = [camera.at(resolution) for camera in scene.cameras]
     rejections: Counter[str] = Counter()
@@ -117,6 +121,28 @@ def import_room(
     return ImportedRoom(seed, index, scene, tuple(cameras), openings, dict(rejections))
 
 
+def _near_planes_told(scene: ImportedScene, resolution: tuple[int, int]) -> ImportedScene:
+    """The scene with a warning for each camera whose near plane cuts away something that is seen here."""
+    from gibench.generators.imported.survey import hits
+    from gibench.rendering.backend import is_scalar
+
+    changes = []
+    for given in scene.cameras:
+        if given.near <= 0 or is_scalar():
+            continue
+        camera = given.at(resolution)
+        right, down, forward = PinholeCamera(camera.position, camera.target, camera.fov).frame
+        width = math.tan(camera.fov / 2)
+        x, y = np.meshgrid(np.linspace(-1, 1, 48), np.linspace(-1, 1, 36) * resolution[1] / resolution[0])
+        rays = forward + width * (x.ravel()[:, None] * right + y.ravel()[:, None] * down)
+        length = np.linalg.norm(rays, axis=1, keepdims=True)
+        distance = hits(scene.loaded, np.tile(camera.position, (len(rays), 1)), rays / length)[0]
+        if (distance < given.near * length[:, 0]).any():
+            what = f"a near_clip of {given.near:g} m is left out: what it cuts away is seen"
+            changes.append(Change("cameras", what, given.where, loss=True))
+    return replace(scene, changes=(*scene.changes, *changes)) if changes else scene
+
+
 def _rng(seed: int, lane: int) -> np.random.Generator:
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(lane,)))
 
@@ -128,6 +154,8 @@ def write_imported_room(
     folder = Path(folder)
     for name in ("meshes", "textures"):
         (folder / name).mkdir(parents=True, exist_ok=True)
+    if any(name.startswith("spectra/") for name in room.scene.files.values()):
+        (folder / "spectra").mkdir(exist_ok=True)
     for source, name in room.scene.files.items():
         if isinstance(source, str):
             (folder / name).write_bytes(room.scene.tree.made[source])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -12,19 +13,26 @@ from typing import TYPE_CHECKING, Any
 from xml.etree.ElementTree import tostring
 
 from gibench.generators.imported.analytic import mesh_shapes
-from gibench.generators.imported.channels import single_channels
+from gibench.generators.imported.changes import Change
+from gibench.generators.imported.distance_grids import mesh_grids
 from gibench.generators.imported.errors import SceneFileError
 from gibench.generators.imported.files import destinations, named_files, settle_missing
+from gibench.generators.imported.images import check_images, made_images
+from gibench.generators.imported.mesh_files import check_meshes
+from gibench.generators.imported.obj_files import split_objs
 from gibench.generators.imported.own_cameras import GivenCamera, cameras_of, read_camera_file
 from gibench.generators.imported.placing import place, placed_matrix, up_axis
-from gibench.generators.imported.reading import Node, SceneTree, copied, read_tree
+from gibench.generators.imported.reading import SceneTree, read_tree
+from gibench.generators.imported.refusals import refusal, with_lines
 from gibench.generators.imported.shapes import (
     check_references,
     expand_instances,
     name_everything,
+    resolve_aliases,
+    share_emitters,
 )
-from gibench.generators.imported.upgrading import is_legacy, upgrade
-from gibench.generators.imported.upgrading.rules import Change
+from gibench.generators.imported.tree import Node, copied
+from gibench.generators.imported.upgrading import upgrade
 
 if TYPE_CHECKING:
     from gibench.rendering.scene import Scene
@@ -43,7 +51,7 @@ class ImportSettings:
 
     up: axis of the file that is up: "x", "y", "z" or "auto" (`placing.up_axis`). scale: metres of its unit.
     allow_missing: leave out what needs a missing file. allow_outside: read files outside the scene's folder. cameras:
-    a camera file (`own_cameras.read_camera_file`).
+    a camera file (`own_cameras.read_camera_file`). parameters: "name=value", which count before any `<default>`.
     """
 
     up: str = "auto"
@@ -51,6 +59,16 @@ class ImportSettings:
     allow_missing: bool = False
     allow_outside: bool = False
     cameras: Path | None = None
+    parameters: tuple[str, ...] = ()
+
+    @property
+    def values(self) -> dict[str, str]:
+        """The parameters by name. Raises SceneFileError for one that is no name=value."""
+        pairs = [text.partition("=") for text in self.parameters]
+        for (name, equals, _), text in zip(pairs, self.parameters, strict=True):
+            if not equals or not re.fullmatch(r"\w+", name):
+                raise SceneFileError(f"-D: '{text[:60]}' is no name=value, such as -D samples=64")
+        return {name: value for name, _, value in pairs}
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,13 +111,12 @@ class ImportedScene:
             def absolute(source: Path | str) -> str:
                 return f"{scratch}/{source}" if isinstance(source, str) else str(source.resolve())
 
-            text = tostring(self._with_files(absolute), "unicode")
+            text, places = with_lines(self._with_files(absolute))
             try:
                 with threads_to_load():
                     return wrap(mi.load_string(text, optimize=False))
-            except RuntimeError as problem:
-                reason = " ".join(str(problem).split())
-                raise SceneFileError(f"Mitsuba refuses {self.tree.file}: {reason}") from None
+            except (RuntimeError, UnicodeDecodeError) as problem:
+                raise SceneFileError(refusal(problem, places, self.tree.file, scratch)) from None
 
     def with_files(self) -> Node:
         """A copy of the scene whose file names are those of a room's folder."""
@@ -107,8 +124,8 @@ class ImportedScene:
 
     def _with_files(self, named: Callable[[Path | str], str]) -> Node:
         copy = replace(self.tree, root=copied(self.tree.root))
-        for _, name, source in named_files(copy):
-            name.set("value", named(source))
+        for file in named_files(copy):
+            file.element.set(file.attribute, named(file.source))
         return copy.root
 
 
@@ -118,8 +135,7 @@ def import_scene(file: Path, settings: ImportSettings | None = None) -> Imported
     Raises SceneFileError for whatever is wrong with it, its files or the settings.
     """
     settings = settings or ImportSettings()
-    tree = read_tree(file, allow_outside=settings.allow_outside)
-    legacy = is_legacy(tree.root)
+    tree = read_tree(file, allow_outside=settings.allow_outside, parameters=settings.values)
     changes = upgrade(tree)
 
     def note(rule: str) -> Any:
@@ -128,11 +144,17 @@ def import_scene(file: Path, settings: ImportSettings | None = None) -> Imported
 
         return take
 
+    resolve_aliases(tree.root, note("aliases"))
     check_references(tree.root)
-    missing = settle_missing(tree, allow_missing=settings.allow_missing)
-    single_channels(tree, note("channels"), legacy=legacy)
+    share_emitters(tree.root, note("shared_lights"))
+    split_objs(tree, note("obj_files"))
+    missing = settle_missing(tree, note("files"), allow_missing=settings.allow_missing)
+    check_images(tree)
+    check_meshes(tree)
+    made_images(tree, note("images"))
     expand_instances(tree.root, note("instances"))
     name_everything(tree.root)
+    mesh_grids(tree, note("distance_grids"))
     mesh_shapes(tree, note("analytic"))
     if not tree.root.nodes("shape"):
         raise SceneFileError(f"{file}: the scene has no shape, so there is nothing to see")
@@ -140,9 +162,9 @@ def import_scene(file: Path, settings: ImportSettings | None = None) -> Imported
     place(tree.root, up, settings.scale)
     cameras = cameras_of(tree.root, note("cameras"))
     if settings.cameras is not None:
-        cameras += read_camera_file(settings.cameras, placed_matrix(up, settings.scale))
+        cameras += read_camera_file(settings.cameras, placed_matrix(up, settings.scale), changes)
     resolution, max_depth = _settled_settings(tree.root)
-    warnings = []
+    warnings = [f"-D {name}: nothing in the scene asks for ${name}" for name in sorted(tree.unused)]
     if not any(node.tag == "emitter" for node in tree.root.everything()):
         warnings.append("the scene has no light: everything in it is black")
     if missing:
@@ -180,9 +202,12 @@ def _settled_settings(root: Node) -> tuple[tuple[int, int], int]:
 def _whole(node: Node, name: str, default: int) -> int:
     text = node.value(name, str(default))
     try:
-        return int(text)
+        value = int(text)
     except ValueError:
-        raise SceneFileError(f"{node.where}: {name} '{text}' is no whole number") from None
+        raise SceneFileError(f"{node.where}: {name} '{text[:40]}' is no whole number") from None
+    if node.tag == "film" and not 1 <= value <= 16384:
+        raise SceneFileError(f"{node.where}: a film has a {name} from 1 to 16384, not {value}")
+    return max(-1, min(value, 2**31 - 1))
 
 
 def scene_title(file: Path) -> str:
@@ -195,11 +220,16 @@ def fingerprint(file: Path, settings: ImportSettings) -> str:
 
     Raises SceneFileError.
     """
-    tree = read_tree(file, allow_outside=settings.allow_outside)
+    tree = read_tree(file, allow_outside=settings.allow_outside, parameters=settings.values)
     digest = hashlib.sha256(tostring(tree.root))
-    for _, name, path in named_files(tree):
-        digest.update(name.get("value", "").encode() + b"\0")
-        if isinstance(path, Path) and path.is_file():
-            with path.open("rb") as content:
-                digest.update(hashlib.file_digest(content, "sha256").digest())
+    paths: list[Path] = []
+    for named in named_files(tree):
+        digest.update(named.name.encode() + b"\0")
+        if isinstance(named.source, Path) and named.source.is_file():
+            paths.append(named.source)
+            # The materials of an OBJ file lie beside it.
+            paths += sorted(named.source.parent.glob("*.mtl")) if named.owner.type == "obj" else []
+    for path in paths:
+        with path.open("rb") as content:
+            digest.update(hashlib.file_digest(content, "sha256").digest())
     return digest.hexdigest()

@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 
 from gibench.generators.imported.errors import SceneFileError
-from gibench.generators.imported.reading import PLUGINS, Node
+from gibench.generators.imported.tree import PLUGINS, Node
 
 
 @cache

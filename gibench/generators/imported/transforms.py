@@ -8,7 +8,7 @@ import re
 import numpy as np
 
 from gibench.generators.imported.errors import SceneFileError
-from gibench.generators.imported.reading import Node
+from gibench.generators.imported.tree import Node
 from gibench.generators.parts import FloatArray
 
 

@@ -5,7 +5,6 @@ Mitsuba merges meshes of one material when it loads a scene, and refuses to wher
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -14,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gibench.generators.imported.files import destinations
-from gibench.generators.imported.reading import Node, copied, new
 from gibench.generators.imported.scene import ImportedScene
-from gibench.generators.parts import Mesh
+from gibench.generators.imported.tree import Node, copied, new
+from gibench.generators.parts import FloatArray, Mesh
 from gibench.generators.scene_files import ply_bytes
 
 
@@ -39,7 +38,8 @@ def _is_flipped(node: Node) -> bool:
 
 
 def _baked(scene: ImportedScene, turned: Mapping[str, NDArray[np.bool_]]) -> ImportedScene:
-    root, made = copied(scene.tree.root), dict(scene.tree.made)
+    root = copied(scene.tree.root)
+    tree = replace(scene.tree, root=root, made=dict(scene.tree.made))
     nodes = {node.get("id", ""): node for node in root.nodes("shape")}
     shapes = {shape.id(): shape for shape in scene.loaded.mi_scene.shapes()}
     for name, faces in turned.items():
@@ -51,8 +51,11 @@ def _baked(scene: ImportedScene, turned: Mapping[str, NDArray[np.bool_]]) -> Imp
             if flipped.all():
                 node.append(new("boolean", node, name="flip_normals", value="true"))
             continue
-        file = f"{re.sub(r'[^A-Za-z0-9_.-]', '_', name)}.turned.ply"
-        made[file] = ply_bytes(_mesh(shape, flipped))
+        mesh, rows = _mesh(shape, flipped)
+        of_vertices, of_faces = _attributes(shape)
+        of_vertices = {kind: values[rows] for kind, values in of_vertices.items()}
+        content = ply_bytes(mesh, vertex_attributes=of_vertices, face_attributes=of_faces)
+        file = tree.make(name, ".turned.ply", content)
         # What is left of it: its materials, its light, and whether its faces are flat.
         kept = [part for part in node.nodes() if part.tag in ("ref", "bsdf", "emitter")]
         flat = node.property("face_normals")
@@ -62,12 +65,29 @@ def _baked(scene: ImportedScene, turned: Mapping[str, NDArray[np.bool_]]) -> Imp
             *kept,
         ]
         node.set("type", "ply")
-    tree = replace(scene.tree, root=root, made=made)
     return replace(scene, tree=tree, files=destinations(tree))
 
 
-def _mesh(shape: Any, flipped: NDArray[np.bool_]) -> Mesh:
-    """A loaded mesh in world space with the faces of its file, those reversed that are said to be, (F,) or (1,)."""
+def _attributes(shape: Any) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
+    """Attributes of the vertices, and of the faces, of a loaded mesh by name, (N, C)."""
+    import mitsuba as mi
+
+    own = ("vertex_positions", "vertex_normals", "vertex_texcoords")
+    found: dict[str, dict[str, FloatArray]] = {"vertex_": {}, "face_": {}}
+    counts = {"vertex_": shape.vertex_count(), "face_": shape.face_count()}
+    for name in sorted(key for key, _ in mi.traverse(shape)):
+        kind = next((kind for kind in found if name.startswith(kind)), None)
+        if kind is not None and name not in own and "." not in name:
+            values = np.array(shape.attribute_buffer(name), dtype=np.float64)
+            found[kind][name.removeprefix(kind)] = values.reshape(counts[kind], -1)
+    return found["vertex_"], found["face_"]
+
+
+def _mesh(shape: Any, flipped: NDArray[np.bool_]) -> tuple[Mesh, NDArray[np.int64]]:
+    """A loaded mesh in world space with the faces of its file, those reversed that are said to be, (F,) or (1,).
+
+    And which vertex of the loaded mesh each of its vertices is.
+    """
 
     def buffer(values: Any, width: int) -> Any:
         return np.array(values, dtype=np.float64).reshape(-1, width)
@@ -77,7 +97,8 @@ def _mesh(shape: Any, flipped: NDArray[np.bool_]) -> Mesh:
     flipped = np.broadcast_to(flipped, len(faces))
     uvs = buffer(shape.vertex_texcoords_buffer(), 2) if shape.has_vertex_texcoords() else np.zeros((0, 2))
     if not shape.has_vertex_normals():
-        return Mesh(vertices, np.where(flipped[:, None], faces[:, ::-1], faces), np.zeros((0, 3)), uvs)
+        turned = Mesh(vertices, np.where(flipped[:, None], faces[:, ::-1], faces), np.zeros((0, 3)), uvs)
+        return turned, np.arange(len(vertices))
     normals = buffer(shape.vertex_normals_buffer(), 3)
     corners = vertices[faces]
     outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -89,9 +110,10 @@ def _mesh(shape: Any, flipped: NDArray[np.bool_]) -> Mesh:
     rows = np.concatenate([kept, reverse])
     kept_row, reverse_row = np.zeros((2, len(vertices)), dtype=np.int32)
     kept_row[kept], reverse_row[reverse] = np.arange(len(kept)), len(kept) + np.arange(len(reverse))
-    return Mesh(
+    turned = Mesh(
         vertices[rows],
         np.where(flipped[:, None], reverse_row[faces[:, ::-1]], kept_row[faces]),
         np.concatenate([normals[kept], -normals[reverse]]),
         uvs[rows] if len(uvs) else uvs,
     )
+    return turned, rows

@@ -181,14 +181,16 @@ def test_a_texture_that_ends_early(tmp_path):
     path.write_bytes(path.read_bytes()[:40])
     texture = '<texture type="bitmap" name="reflectance"><string name="filename" value="a.png"/></texture>'
     file = written(tmp_path, f'<shape type="rectangle"><bsdf type="diffuse">{texture}</bsdf></shape>')
-    with pytest.raises(SceneFileError, match=r"Mitsuba refuses .*scene\.xml"):
+    with pytest.raises(
+        SceneFileError, match=r"scene\.xml:2: Mitsuba refuses it: .* a\.png: |scene\.xml:2: .*\"a\.png\""
+    ):
         _ = import_scene(file).loaded
 
 
 def test_a_mesh_that_is_none(tmp_path):
     (tmp_path / "a.ply").write_text("no mesh")
     file = written(tmp_path, '<shape type="ply"><string name="filename" value="a.ply"/></shape>')
-    with pytest.raises(SceneFileError, match=r"Mitsuba refuses .*scene\.xml: .*a\.ply"):
+    with pytest.raises(SceneFileError, match=r"scene\.xml:2: a\.ply is no PLY file"):
         _ = import_scene(file).loaded
 
 

@@ -1,18 +1,27 @@
 """Old scene files made new: what Mitsuba 0.5 and 0.6 wrote and Mitsuba 3 no longer reads, rule by rule.
 
 Each rule is one function over the whole tree that notes what it did. Those of LEGACY apply to files of a version below
-2, those of ALWAYS to every file. What has no counterpart becomes the nearest thing that there is, with a warning.
+2, the others to every file. What has no counterpart becomes the nearest thing that there is, with a warning.
 
 Reference: the manuals of Mitsuba 0.6 (2014) and Mitsuba 3.9, plugin by plugin.
 """
 
 from __future__ import annotations
 
-from gibench.generators.imported.errors import SceneFileError
-from gibench.generators.imported.reading import Node, SceneTree
+from gibench.generators.imported.changes import Change
+from gibench.generators.imported.reading import SceneTree
 from gibench.generators.imported.shipped import check_plugins
-from gibench.generators.imported.upgrading import colors, left_out, lights, names, surfaces, textures
-from gibench.generators.imported.upgrading.rules import Change, Rule
+from gibench.generators.imported.tree import Node
+from gibench.generators.imported.upgrading import (
+    colors,
+    left_out,
+    lights,
+    names,
+    properties,
+    surfaces,
+    textures,
+)
+from gibench.generators.imported.upgrading.rules import Rule
 
 
 def upgrade(tree: SceneTree) -> list[Change]:
@@ -20,9 +29,8 @@ def upgrade(tree: SceneTree) -> list[Change]:
 
     Raises SceneFileError for plugins that do not exist and have no counterpart, with their place in the file.
     """
-    changes: list[Change] = []
-    legacy = is_legacy(tree.root)
-    for rule in (*LEGACY, *ALWAYS) if legacy else ALWAYS:
+    changes = list(tree.changes)
+    for rule in RULES:
         name = rule.__name__
 
         def note(node: Node, what: str, loss: bool = False, name: str = name) -> None:
@@ -34,17 +42,6 @@ def upgrade(tree: SceneTree) -> list[Change]:
     return changes
 
 
-def is_legacy(root: Node) -> bool:
-    """Whether a scene was written for Mitsuba 0.x. Raises SceneFileError for a version that is none."""
-    version = root.get("version", "")
-    major = version.split(".")[0]
-    if not major.isdigit():
-        raise SceneFileError(
-            f'{root.where}: <scene> has no version such as "0.5.0" or "3.0.0": add the one it is for'
-        )
-    return int(major) < 2
-
-
 LEGACY: tuple[Rule, ...] = (
     names.property_names,
     names.transform_tags,
@@ -53,6 +50,7 @@ LEGACY: tuple[Rule, ...] = (
     names.gone_settings,
     colors.srgb_tags,
     colors.scalar_spectra,
+    colors.black_bodies,
     surfaces.conductors,
     surfaces.phong,
     surfaces.ward,
@@ -61,11 +59,18 @@ LEGACY: tuple[Rule, ...] = (
     surfaces.coatings,
     surfaces.translucent,
     surfaces.distributions,
-    textures.bump_scale,
+    textures.scaled_textures,
     textures.bitmap_gamma,
     textures.texture_lookups,
     textures.grid_textures,
     lights.sun_and_sky,
     lights.gone_lights,
+    properties.unknown_properties,
 )
-ALWAYS: tuple[Rule, ...] = (colors.hexadecimal_colors, left_out.media, left_out.integrators, left_out.films)
+"""Of files of Mitsuba 0.x alone, each of which may include one of another version."""
+
+ALWAYS_FIRST: tuple[Rule, ...] = (colors.hexadecimal_colors, names.empty_rotations)
+ALWAYS_LAST: tuple[Rule, ...] = (left_out.media, left_out.integrators, left_out.films)
+
+RULES = (*ALWAYS_FIRST, *LEGACY, *ALWAYS_LAST)
+"""In the order in which they apply."""

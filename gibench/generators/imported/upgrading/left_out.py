@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from gibench.generators.imported.reading import Node
-from gibench.generators.imported.upgrading.rules import Note, become
+from gibench.generators.imported.changes import Note
+from gibench.generators.imported.tree import Node
+from gibench.generators.imported.upgrading.rules import become
 
 
 def media(root: Node, note: Note) -> None:
@@ -21,9 +22,13 @@ def media(root: Node, note: Note) -> None:
 def integrators(root: Node, note: Note) -> None:
     """Every integrator becomes a path tracer of the same depth."""
     for node in root.nodes("integrator"):
+        for part in node.everything():
+            if part.value("hide_emitters") == "true":
+                note(part, "hide_emitters is left out: lamps and the environment are seen", loss=True)
+        depth = next((d for part in node.everything() if (d := part.property("max_depth")) is not None), None)
         if node.type == "path":
+            become(node, "path", *([depth] if depth is not None else []))
             continue
-        depth = node.property("max_depth")
         note(node, f"integrator {node.type} is path", loss=node.type in ("direct", "ao", "depth"))
         become(node, "path", *([depth] if depth is not None else []))
 
@@ -39,5 +44,17 @@ def films(root: Node, note: Note) -> None:
                 note(part, f"{part.type} is hdrfilm")
             if part.property("high_quality_edges") is not None:
                 note(part, "high_quality_edges is left out")
+            _note_crop(part, note)
             part[:] = [p for p in (part.property("width"), part.property("height")) if p is not None]
             part.set("type", "hdrfilm")
+
+
+def _note_crop(film: Node, note: Note) -> None:
+    """Say so where a film shows a part of its image alone."""
+    crop = {name: film.value(f"crop_{name}") for name in ("offset_x", "offset_y", "width", "height")}
+    whole = {"offset_x": ("", "0"), "offset_y": ("", "0")}
+    whole |= {name: ("", film.value(name)) for name in ("width", "height")}
+    if any(value not in whole[name] for name, value in crop.items()):
+        asked = f"{crop['width'] or 'all'}x{crop['height'] or 'all'}"
+        asked += f" at {crop['offset_x'] or 0}, {crop['offset_y'] or 0}"
+        note(film, f"the crop window {asked} is left out: the whole film is rendered", loss=True)

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import math
 
-from gibench.generators.imported.reading import Node, new
-from gibench.generators.imported.upgrading.rules import (
-    Note,
-    become,
-    constant_color,
-    number,
-    plugins,
-    rgb,
-    setting,
-)
+import numpy as np
+
+from gibench.generators.imported.changes import Note
+from gibench.generators.imported.transforms import matrix_of
+from gibench.generators.imported.tree import Node, new
+from gibench.generators.imported.upgrading import sun
+from gibench.generators.imported.upgrading.rules import become, constant_color, number, plugins, rgb, setting
 
 
 def sun_and_sky(root: Node, note: Note) -> None:
@@ -42,6 +39,7 @@ def sun_and_sky(root: Node, note: Note) -> None:
             else:
                 # A sun without size was a directional light of the same power.
                 note(radius, "sunRadiusScale 0 is a sun of its true size", loss=True)
+        _sun_direction(node, note)
         for part_name, applies in (("sun_scale", old == "sky"), ("sky_scale", old == "sun")):
             if applies:
                 node.append(setting(node, "float", part_name, 0))
@@ -50,6 +48,23 @@ def sun_and_sky(root: Node, note: Note) -> None:
         node.set("type", renamed[old])
         _zenith_up(node)
         note(node, f"{old} with its zenith at +y is sunsky with its zenith at +z, turned", loss=True)
+
+
+def _sun_direction(node: Node, note: Note) -> None:
+    """Where the sun stands at a place and a time becomes its direction: Mitsuba 3 has its axes elsewhere."""
+    given = {name: node.property(name) for name in sun.DEFAULTS}
+    for part in given.values():
+        if part is not None:
+            node.remove(part)
+    if node.property("sun_direction") is not None:
+        return
+    values = {name: number(part, part.get("value", "")) for name, part in given.items() if part is not None}
+    local = sun.direction(**{**sun.DEFAULTS, **values})
+    world = matrix_of(node.property("to_world"))[:3, :3] @ local
+    x, y, z = (repr(round(float(c), 9)) for c in world / np.linalg.norm(world))
+    node.append(new("vector", node, name="sun_direction", x=x, y=y, z=z))
+    when = ", ".join(f"{name} {value:g}" for name, value in values.items()) or "its default place and time"
+    note(node, f"the sun of {when} stands at ({x}, {y}, {z})")
 
 
 def _zenith_up(node: Node) -> None:

@@ -4,39 +4,24 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
 
+from gibench.generators.imported.changes import Note
 from gibench.generators.imported.errors import SceneFileError
-from gibench.generators.imported.reading import Node, new
-
-
-@dataclass(frozen=True)
-class Change:
-    """What a rule did somewhere. rule: its name. what: in words. where: "scene.xml:12". loss: the image may differ."""
-
-    rule: str
-    what: str
-    where: str
-    loss: bool = False
-
-
-Note = Callable[..., None]
-"""note(node, what, loss=False)"""
-
+from gibench.generators.imported.tree import Node, new
 
 Rule = Callable[[Node, Note], None]
 """Rewrites the tree below a `<scene>` in place."""
 
 
 def plugins(root: Node, tag: str, *types: str) -> list[Node]:
-    """All plugins of a tag, or those of some types."""
-    return [n for n in root.everything() if n.tag == tag and (not types or n.type in types)]
+    """All plugins of a tag in files of Mitsuba 0.x, or those of some types."""
+    return [n for n in old(root) if n.tag == tag and (not types or n.type in types)]
 
 
-def parents_of(root: Node) -> dict[int, Node]:
-    """The parent of each element, by the id() of the element."""
-    return {id(child): node for node in root.everything() for child in node}
+def old(root: Node) -> Iterator[Node]:
+    """The elements that stand in files of Mitsuba 0.x: one file may include one of another version."""
+    return (node for node in root.everything() if node.legacy)
 
 
 def become(node: Node, type: str, *children: Node) -> None:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 import re
 
+from gibench.generators.imported.changes import Note
 from gibench.generators.imported.errors import SceneFileError
-from gibench.generators.imported.reading import Node, new
+from gibench.generators.imported.tree import Node, new
 from gibench.generators.imported.upgrading.rules import (
-    Note,
     become,
     constant_color,
     number,
+    old,
     plugins,
     rgb,
     setting,
@@ -52,8 +53,10 @@ def phong(root: Node, note: Note) -> None:
         exponent = (
             number(node, node.value("exponent", "30")) if node.property("exponent") is not None else 30.0
         )
+        if not exponent >= 0:
+            raise SceneFileError(f"{node.where}: phong has an exponent of {exponent:g}: give one from 0")
         alpha = math.sqrt(2 / (exponent + 2))
-        _lobes(node, alpha, alpha)
+        lobes(node, alpha, alpha)
         note(node, f"phong is diffuse and a GGX lobe of roughness {alpha:.3g}", loss=True)
 
 
@@ -61,11 +64,11 @@ def ward(root: Node, note: Note) -> None:
     """`ward` becomes a blend of `diffuse` and a rough mirror of its roughness."""
     for node in plugins(root, "bsdf", "ward"):
         u, v = (number(node, node.value(name, "0.1")) for name in ("alpha_u", "alpha_v"))
-        _lobes(node, u, v)
+        lobes(node, u, v)
         note(node, "ward is diffuse and a GGX lobe", loss=True)
 
 
-def _lobes(node: Node, alpha_u: float, alpha_v: float) -> None:
+def lobes(node: Node, alpha_u: float, alpha_v: float) -> None:
     """A diffuse and a glossy lobe of the albedos of a legacy plugin with both."""
     diffuse, specular = node.property("diffuse_reflectance"), node.property("specular_reflectance")
     kd, ks = constant_color(diffuse, 0.5), constant_color(specular, 0.2)
@@ -180,7 +183,7 @@ def translucent(root: Node, note: Note) -> None:
 
 def distributions(root: Node, note: Note) -> None:
     """Microfacet distributions that are gone become the nearest: phong is beckmann, as (Ashikhmin) is ggx."""
-    for node in root.everything():
+    for node in old(root):
         if (
             node.tag == "string"
             and node.get("name") == "distribution"

@@ -2,28 +2,90 @@
 
 from __future__ import annotations
 
+from gibench.generators.imported.changes import Note
 from gibench.generators.imported.errors import SceneFileError
-from gibench.generators.imported.reading import Node, new
-from gibench.generators.imported.upgrading.rules import Note, become, number, parents_of, plugins, setting
+from gibench.generators.imported.tree import Node, copied, new, parents_of, replaced
+from gibench.generators.imported.upgrading.rules import become, constant_color, number, plugins, rgb, setting
 
 
-def bump_scale(root: Node, note: Note) -> None:
-    """A `scale` texture in a `bumpmap` becomes its strength; around any other texture it is left out."""
+def scaled_textures(root: Node, note: Note) -> None:
+    """A `scale` texture in a `bumpmap` becomes its strength; around any other texture the colours are multiplied.
+
+    Of a bitmap the factor stays as its property FACTOR, until `images.multiplied` has made an image of the product.
+    """
+    by_id = {node.get("id"): node for node in root.everything() if node.tag != "ref" and node.get("id")}
     parents = parents_of(root)
     for node in plugins(root, "texture", "scale"):
         inner = next(iter(node.nodes("texture", "ref")), None)
         if inner is None:
             raise SceneFileError(f"{node.where}: a scale texture without a texture inside")
-        strength, parent = node.value("scale", "1"), parents[id(node)]
-        if node.get("name"):
-            inner.set("name", node.get("name", ""))
-        parent[list(parent).index(node)] = inner
-        parents[id(inner)] = parent
+        factor, parent = node.property("scale"), parents[id(node)]
+        color = constant_color(factor, 1.0)
+        text = "1" if factor is None else factor.get("value", "")
+        if color is None:
+            raise SceneFileError(
+                f"{node.where}: the scale '{text}' of a texture is no colour: write one or three numbers"
+            )
         if parent.type == "bumpmap":
-            parent.append(setting(node, "float", "scale", strength))
-            note(node, f"a scale of {strength} is that of the bumpmap")
+            _in_the_place_of(node, inner, parent, parents)
+            parent.append(setting(node, "float", "scale", repr(sum(color) / 3)))
+            note(node, f"a scale of {text} is that of the bumpmap")
+            continue
+        if inner.tag == "ref":
+            target = by_id.get(inner.get("id"))
+            if target is None or target.tag != "texture":
+                raise SceneFileError(
+                    f"{node.where}: nothing has the id '{inner.get('id')}' that <ref> asks for"
+                )
+            inner = copied(target)
+            inner.attrib.pop("id", None)
+        _in_the_place_of(node, inner, parent, parents)
+        if _multiplied(inner, color):
+            note(node, f"a texture's scale of {text} is multiplied into it")
         else:
-            note(node, f"a texture's scale of {strength} is left out", loss=True)
+            note(node, f"the scale of {text} of a {inner.type} texture is left out", loss=True)
+
+
+FACTOR = "gibench_factor"
+"""Of a bitmap: what its values are multiplied by before Mitsuba sees them."""
+
+COLORS_OF = {"checkerboard": {"color0": 0.4, "color1": 0.2}, "gridtexture": {"color0": 0.2, "color1": 0.4}}
+"""Names and defaults of the colours of textures; in Mitsuba 0.6 gridtexture has the line second."""
+
+
+def _in_the_place_of(node: Node, inner: Node, parent: Node, parents: dict[int, Node]) -> None:
+    for key in ("name", "id"):
+        if node.get(key):
+            inner.set(key, node.get(key, ""))
+    replaced(parent, node, inner)
+    parents[id(inner)] = parent
+
+
+def _multiplied(texture: Node, factor: tuple[float, float, float]) -> bool:
+    """Multiply the colours of a texture, in place; whether that can be done."""
+    if texture.type == "bitmap":
+        before = constant_color(texture.property(FACTOR), 1.0) or (1.0, 1.0, 1.0)
+        for gone in [part for part in texture.nodes() if part.get("name") == FACTOR]:
+            texture.remove(gone)
+        texture.append(rgb(texture, FACTOR, tuple(a * b for a, b in zip(before, factor, strict=True))))
+        return True
+    if texture.type == "scale":  # one in another: the outer factor goes on to what is inside
+        own = texture.property("scale")
+        before = constant_color(own, 1.0) or (1.0, 1.0, 1.0)
+        if own is not None:
+            texture.remove(own)
+        texture.append(rgb(texture, "scale", tuple(a * b for a, b in zip(before, factor, strict=True))))
+        return True
+    colors = COLORS_OF.get(texture.type, {})
+    for name, default in colors.items():
+        part = texture.property(name)
+        color = constant_color(part, default)
+        if color is None:
+            return False
+        if part is not None:
+            texture.remove(part)
+        texture.append(rgb(texture, name, tuple(a * b for a, b in zip(color, factor, strict=True))))
+    return bool(colors)
 
 
 def bitmap_gamma(root: Node, note: Note) -> None:

@@ -1,0 +1,19 @@
+"""What was done to a scene, as it is noted and told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+Note = Callable[..., None]
+"""note(node, what, loss=False)"""
+
+
+@dataclass(frozen=True)
+class Change:
+    """What a rule did somewhere. rule: its name. what: in words. where: "scene.xml:12". loss: the image may differ."""
+
+    rule: str
+    what: str
+    where: str
+    loss: bool = False
