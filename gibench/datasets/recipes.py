@@ -278,7 +278,11 @@ def preset_names() -> tuple[str, ...]:
 
 
 def load_preset(name: str, overrides: Mapping[str, Any] | None = None) -> Recipe:
-    """Load a recipe that ships with gibench; `overrides` as in `load_recipe`. Raises `RecipeError`."""
+    """Load a recipe that ships with gibench; `overrides` as in `load_recipe`. Raises `RecipeError`.
+
+    >>> load_preset("small", {"rooms": 3, "kinds": ["office"]}).rooms
+    3
+    """
     if name not in preset_names():
         raise RecipeError(f"no preset '{name}'; {nearest(name, preset_names())}")
     text = (resources.files("gibench.datasets") / "presets" / f"{name}.toml").read_text(encoding="utf-8")

@@ -1,18 +1,21 @@
 """Error measures for rendered images and sequences: arrays in, numbers or maps out.
 
 Every image metric is called as `metric(pred, ref, …)` on float arrays (H, W, 3) or (N, H, W, 3). A metric is
-one file and one line of the list below, which is also the order of the registry `METRICS`.
+one file (errors that each value has by itself share `linear`) and one line of the list below, which is also the order
+of the registry `METRICS`.
 """
 
 from typing import Any
 
 # The order is that of the registry.
 # isort: off
-from gibench.metrics.mse import mse as mse
-from gibench.metrics.rmse import rmse as rmse
-from gibench.metrics.mae import mae as mae
-from gibench.metrics.relmse import relmse as relmse
-from gibench.metrics.smape import smape as smape
+from gibench.metrics.linear import (
+    mse as mse,
+    rmse as rmse,
+    mae as mae,
+    relmse as relmse,
+    smape as smape,
+)
 from gibench.metrics.psnr import psnr as psnr
 from gibench.metrics.rmse_display import rmse_display as rmse_display
 from gibench.metrics.ssim import ssim as ssim

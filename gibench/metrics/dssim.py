@@ -1,5 +1,7 @@
 """Structural dissimilarity of display values."""
 
+from __future__ import annotations
+
 from numpy.typing import ArrayLike
 
 from gibench.metrics.inputs import MetricValue

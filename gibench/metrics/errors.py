@@ -1,5 +1,7 @@
 """The named errors and the one warning of the metrics."""
 
+from __future__ import annotations
+
 from gibench.errors import GibenchError
 
 

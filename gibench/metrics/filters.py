@@ -1,5 +1,7 @@
 """Separable filters on image planes, fast and without a dependency beyond NumPy."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator
 
 import numpy as np

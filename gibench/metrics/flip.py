@@ -1,5 +1,7 @@
 """FLIP: the difference that an observer sees when two images alternate on a display."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache

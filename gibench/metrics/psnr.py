@@ -1,11 +1,13 @@
 """Peak signal-to-noise ratio of display values."""
 
+from __future__ import annotations
+
 import math
 
 from numpy.typing import ArrayLike
 
 from gibench.metrics.inputs import FloatArray, Mask, MetricValue, display_pair, each_frame, frame_mask
-from gibench.metrics.mse import squared_error
+from gibench.metrics.linear import squared_error
 from gibench.metrics.pixelwise import mean_error
 from gibench.metrics.registry import register
 
@@ -36,6 +38,12 @@ def psnr(
 
     Raises:
         DtypeError, ShapeError, NonFiniteError, RangeError: for inputs that are not such images.
+
+    Examples:
+        >>> import numpy as np
+        >>> ref = np.full((2, 2, 3), 0.5)
+        >>> round(psnr(ref + 0.1, ref), 3)
+        20.0
 
     References:
         Wang & Bovik 2009, Mean squared error: love it or leave it?, IEEE Signal Processing Magazine 26(1).

@@ -1,5 +1,7 @@
 """What is known of each metric, and where all of them are listed."""
 
+from __future__ import annotations
+
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field

@@ -4,6 +4,8 @@ Motion is in pixels, to the frame before: the point seen at column x, row y lay 
 row y + motion[…, 1] of the frame before. The first frame of a sequence has none before it.
 """
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Root of the mean squared error of display values."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

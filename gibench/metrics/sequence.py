@@ -1,5 +1,7 @@
 """What the metrics of sequences in time have in common."""
 
+from __future__ import annotations
+
 import math
 import warnings
 from collections.abc import Callable

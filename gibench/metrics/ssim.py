@@ -1,5 +1,7 @@
 """Structural similarity of display values."""
 
+from __future__ import annotations
+
 import numpy as np
 from numpy.typing import ArrayLike
 

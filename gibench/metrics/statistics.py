@@ -10,6 +10,8 @@ sum after Satterthwaite (1946, An approximate distribution of estimates of varia
 2(6)). A bootstrap of three seeds knows a third too little of their variance, and nothing of how badly it knows it.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np
@@ -85,6 +87,13 @@ def paired_difference(
 
     Raises:
         ShapeError, NonFiniteError, MetricInputError: see `mean_interval`.
+
+    Examples:
+        >>> kitchen, office = [0.30, 0.32], [0.10, 0.12]
+        >>> worse = [value + shift for value, shift in zip(kitchen + office, [0.010, 0.010, 0.012, 0.012])]
+        >>> interval = paired_difference(worse, kitchen + office, ["kitchen"] * 2 + ["office"] * 2)
+        >>> round(interval.mean, 3), interval.rooms, interval.frames
+        (0.011, 2, 4)
     """
     a, b = _checked("first", first, rooms), _checked("second", second, rooms)
     return _interval(a.mean(axis=0) - b.mean(axis=0), [a, b], rooms, level)

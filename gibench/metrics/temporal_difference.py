@@ -1,5 +1,7 @@
 """Temporal difference: does the prediction change as the reference does."""
 
+from __future__ import annotations
+
 import numpy as np
 from numpy.typing import ArrayLike
 

@@ -4,6 +4,8 @@ The exposure comes from the reference alone, so that no method can choose its ow
 at under the same exposure on the same frame. Nothing is rounded to 8 bits.
 """
 
+from __future__ import annotations
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -36,6 +38,11 @@ def reference_exposure(ref: ArrayLike, *, shared: bool = False) -> float | NDArr
 
     Raises:
         DtypeError, ShapeError, NonFiniteError, RangeError: for an input that is no such image.
+
+    Examples:
+        >>> import numpy as np
+        >>> round(reference_exposure(np.full((4, 4, 3), 9.0)), 6)
+        0.02
     """
     image = _radiance("ref", ref)
     if image.ndim == 4 and not shared:
@@ -55,6 +62,12 @@ def tone_map(radiance: ArrayLike, exposure: ArrayLike) -> FloatArray:
 
     Raises:
         DtypeError, ShapeError, NonFiniteError, RangeError: for inputs that are no such image or exposure.
+
+    Examples:
+        >>> import numpy as np
+        >>> radiance = np.array([[[0.0, 0.09, 50.0]]])
+        >>> tone_map(radiance, 2.0).round(3)
+        array([[[0.   , 0.461, 1.   ]]])
 
     References:
         IEC 61966-2-1:1999, section 5.2 (the sRGB transfer function).

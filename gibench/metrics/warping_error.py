@@ -1,5 +1,7 @@
 """Warping error: how much a sequence changes along its motion."""
 
+from __future__ import annotations
+
 import numpy as np
 from numpy.typing import ArrayLike
 

@@ -72,6 +72,11 @@ class PinholeCamera:
         """Pixel coordinates (x, y) and depth of world points (…, 3); inside of kernels: `RayGenerator.project`.
 
         The centre of the first pixel is (0.5, 0.5). Where the depth is not positive, x and y mean nothing.
+
+        >>> camera = PinholeCamera(position=(0, 0, 1), target=(0, 5, 1), fov=np.pi / 2)
+        >>> x, y, depth = camera.project(np.array([[0.0, 2.0, 1.0], [1.0, 2.0, 1.0]]), (64, 48))
+        >>> x.tolist(), y.tolist(), depth.tolist()
+        ([32.0, 48.0], [24.0, 24.0], [2.0, 2.0])
         """
         width, height = resolution
         focal = self.focal_length(width)

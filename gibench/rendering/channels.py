@@ -99,6 +99,9 @@ def resolve(names: Iterable[str]) -> tuple[str, ...]:
     """Channel names from a mixture of set and channel names, without repeats, in the order of the contract.
 
     Raises UnknownChannelError with the nearest names.
+
+    >>> resolve(["motion", "color"])
+    ('color', 'motion', 'motion_valid')
     """
     wanted: set[str] = set()
     for name in names:

@@ -31,6 +31,10 @@ class AreaLight:
     centre: world space, m. direction: in which it shines; made unit. width, height: sides, m, > 0. radiance:
     W·m⁻²·sr⁻¹, linear Rec. 709, ≥ 0. up: along its height, at an angle to the direction; by default the side that is
     as upright as can be. Seen from behind it is black. Raises LightingError for what is no such rectangle.
+
+    >>> light = AreaLight((0, 0, 2.5), direction=(0, 0, -1), width=1, height=0.5, radiance=(2, 2, 2))
+    >>> light.area, round(light.luminous_flux)
+    (0.5, 2146)
     """
 
     centre: tuple[float, float, float]
