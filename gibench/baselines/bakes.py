@@ -157,6 +157,9 @@ def remove_abandoned(root: Path) -> None:
 
 def _lock(descriptor: int, *, wait: bool) -> None:
     """Lock a folder for as long as the descriptor is open. Raises OSError: held by another, or not possible."""
-    import fcntl  # Unix; imported here so that cards of methods load everywhere
+    try:
+        import fcntl
+    except ImportError:  # Windows locks no folders
+        raise OSError(errno.ENOTSUP, "folders cannot be locked here") from None
 
     fcntl.flock(descriptor, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -10,6 +10,8 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from filelock import FileLock, Timeout
+
 from gibench import gate
 from gibench.datasets.errors import FolderError
 
@@ -130,48 +132,35 @@ def _short(root: Path) -> str:
     return text if len(text) <= 200 else f"{text[:200]}…"
 
 
-def lock_folder(root: Path) -> int:
-    """Descriptor of the lock file, held by this process until it ends, however it ends.
+def lock_folder(root: Path) -> FileLock:
+    """The lock of a folder, held by this process until `unlock_folder` or its end, however it ends.
 
-    Raises `FolderError` where another process holds it.
+    Raises `FolderError` where another process holds it, or where its file is a link or no file.
     """
+    path = root / LOCK
+    lock = FileLock(path, timeout=0, mode=0o644)
+    # A link would have the lock made, or held, somewhere else.
+    no_file = FolderError(f"{path} is a link or no file: remove it, or choose another folder with --out")
+    if path.is_symlink() or (path.exists() and not path.is_file()):
+        raise no_file
     try:
-        import fcntl  # Unix; imported here so that reading datasets works everywhere
-    except ImportError:
+        lock.acquire()
+    except Timeout:
         raise FolderError(
-            f"{root} cannot be locked: this system has no file locks; make datasets under Linux, macOS or WSL"
+            f"{root} is in use by another run: wait for it, or write elsewhere with --out"
         ) from None
-
-    while True:
-        # A link would have the lock made, or held, somewhere else.
-        try:
-            descriptor = os.open(root / LOCK, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
-        except OSError as problem:
-            if problem.errno in (errno.ELOOP, errno.EMLINK, errno.EISDIR, errno.ENXIO):
-                raise FolderError(
-                    f"{root / LOCK} is a link or no file: remove it, or choose another folder with --out"
-                ) from None
-            raise
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            os.close(descriptor)
-            raise FolderError(
-                f"{root} is in use by another run: wait for it, or write elsewhere with --out"
-            ) from None
-        # Another run may have removed the file between opening and locking; then this lock guards nothing.
-        try:
-            if os.fstat(descriptor).st_ino == os.stat(root / LOCK).st_ino:
-                return descriptor
-        except FileNotFoundError:
-            pass
-        os.close(descriptor)
+    except OSError as problem:
+        if problem.errno in (errno.ELOOP, errno.EMLINK, errno.EISDIR, errno.ENXIO):
+            raise no_file from None
+        raise
+    return lock
 
 
-def unlock_folder(root: Path, lock: int) -> None:
-    """Give back what `lock_folder` took."""
-    (root / LOCK).unlink(missing_ok=True)
-    os.close(lock)
+def unlock_folder(root: Path, lock: FileLock) -> None:
+    """Give back what `lock_folder` took, and its file: who waits for it finds that it is gone and makes it anew."""
+    if os.name == "posix":  # elsewhere releasing removes it, and an open file cannot be removed
+        (root / LOCK).unlink(missing_ok=True)
+    lock.release()
 
 
 def _remove_empty(folders: Iterable[Path]) -> None:
