@@ -57,6 +57,20 @@ def make(
     kind: Annotated[
         str | None, typer.Option(help="Kinds of rooms, such as living,office.", show_default="all")
     ] = None,
+    lighting: Annotated[
+        str | None,
+        typer.Option(
+            help="own, area-light or environments: what lights a frame, one of its own each.",
+            show_default="own",
+        ),
+    ] = None,
+    environments: Annotated[
+        str | None,
+        typer.Option(
+            help="Maps that light frames: indoor, outdoor, train, test, a folder or file, names of maps.",
+            show_default="indoor",
+        ),
+    ] = None,
     scene: SceneFiles = None,
     up: UpAxis = None,
     scale: Scale = None,
@@ -91,6 +105,8 @@ def make(
         "error": error,
         "channels": None if channels is None else names_in(channels, "--channels"),
         "kinds": None if kind is None else names_in(kind, "--kind"),
+        "lighting": lighting or (None if environments is None else "environments"),
+        "environments": None if environments is None else names_in(environments, "--environments"),
         "cameras": None if cameras is None else str(cameras),
         **scene_options(scene, up, scale, allow_missing, allow_outside),
     }
@@ -114,6 +130,8 @@ def make(
         "--error": error,
         "--channels": channels,
         "--kind": kind,
+        "--lighting": lighting,
+        "--environments": environments,
         "--cameras": cameras,
         "--variant": None if variant == "auto" else variant,
         "--workers": None if workers == 1 else workers,

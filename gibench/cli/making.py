@@ -15,6 +15,9 @@ from gibench.datasets.making import make
 from gibench.datasets.recipes import Recipe
 from gibench.datasets.records import Described
 
+#: What moves in a sequence, in words.
+MOVING = {"camera": "the camera moves", "light": "the light moves", "both": "camera and light move"}
+
 #: Rewrites of scene files that change names alone; they are counted.
 QUIET_RULES = ("property_names", "transform_tags")
 
@@ -45,6 +48,12 @@ def describe(root: Path, manifest: dict[str, Any]) -> None:
         splits = ", ".join(f"{name} {count}" for name, count in totals["splits"].items())
         say(_row("rooms", f"{totals['rooms']}{done}"))
         say(_row("frames", f"{totals['frames']} ({splits}), {width}x{height}, {samples}"))
+    if recipe.get("lighting", "own") != "own":
+        maps = f" ({', '.join(map(str, recipe['environments']))})" if recipe["environments"] else ""
+        say(_row("lighting", f"{recipe['lighting']}{maps}, one of its own a frame"))
+    for name, sequence in recipe.get("sequences", {}).items():
+        moving = MOVING[sequence["moves"]]
+        say(_row("sequence", f"{name}: {sequence['views']} frames, {moving}"))
     denoised = "denoised" if recipe["denoise"] else "not denoised"
     say(_row("channels", f"{len(recipe['channels'])}, {denoised}"))
     if totals is not None:

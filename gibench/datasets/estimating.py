@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from gibench.datasets import exr, pool
 from gibench.datasets.making import default_threads
 from gibench.datasets.recipes import Recipe
-from gibench.datasets.room_making import Renderer, given_cameras, rendered_frame, sampled_room, written_room
+from gibench.datasets.room_making import LoadedRoom, Renderer, given_cameras, sampled_room, written_room
 from gibench.generators.parts import Room
 
 if TYPE_CHECKING:
@@ -90,8 +90,6 @@ class RoomChecker:
         }
 
     def _measured(self, room: Room | ImportedRoom) -> dict[str, float]:
-        from gibench.rendering.scene import load_scene
-
         recipe = self.recipe
         width = min(recipe.resolution[0], MEASURED_WIDTH)
         height = max(1, round(recipe.resolution[1] * width / recipe.resolution[0]))
@@ -103,11 +101,11 @@ class RoomChecker:
         with tempfile.TemporaryDirectory(prefix="gibench-") as scratch:
             started = time.perf_counter()
             written_room(room, Path(scratch), recipe)
-            scene = load_scene(Path(scratch) / "scene.xml", share_kernels=True)
+            loaded = LoadedRoom.of(recipe, room, Path(scratch))
             load_seconds = time.perf_counter() - started
             size = sum(file.stat().st_size for file in Path(scratch).rglob("*") if file.is_file())
-            rendered_frame(recipe, scene, room, 0, **settings)  # compiles the kernels
-            frame = rendered_frame(recipe, scene, room, 0, **settings)
+            loaded.rendered(0, **settings)  # compiles the kernels
+            frame = loaded.rendered(0, **settings)
         started = time.perf_counter()
         content = exr.encode(frame.arrays)
         pixels = width * height
@@ -151,9 +149,7 @@ def estimate(
             _scale(result, answer["measured"])
         on_room(result.rooms + len(result.rejected_rooms), recipe.rooms)
 
-    work = work or pool.Work(
-        Renderer(variant, default_threads(workers), recipe.environment), RoomChecker(recipe)
-    )
+    work = work or pool.Work(Renderer(variant, default_threads(workers), recipe), RoomChecker(recipe))
     listener = pool.Listener(ready, lambda room, kind, content: None, done, lambda room: None)
     pool.run_rooms(work, range(recipe.rooms), listener, workers=min(workers, recipe.rooms))
     result.build_seconds = sum(build_seconds) / max(len(build_seconds), 1)

@@ -20,6 +20,7 @@ TABLE = "frames.parquet"
 PREVIEW = "preview.png"
 RECORD = "frames.json"
 LOCK = ".lock"
+ENVIRONMENTS = "environments"
 
 
 def room_folder(root: Path, room: int) -> Path:
@@ -51,6 +52,8 @@ def remove_partials(root: Path, room: int | None = None) -> None:
         if gate.real_folder(left):
             shutil.rmtree(left, ignore_errors=True)
     if room is None:
+        for left in own_leftovers(root / ENVIRONMENTS, r"\.[0-9a-f]{64}\.exr\.partial-[0-9]+"):
+            left.unlink(missing_ok=True)
         names = "|".join(map(re.escape, (MANIFEST, TABLE, PREVIEW)))
         for left in own_leftovers(root.resolve(), rf"\.({names})\.partial-[0-9]+"):
             if not gate.real_folder(left):
@@ -68,7 +71,9 @@ def remove_empty_dataset(root: Path) -> None:
     """Remove what a dataset without any whole room consists of. Only for the holder of the lock."""
     for name in (MANIFEST, TABLE, PREVIEW):
         (root / name).unlink(missing_ok=True)
-    _remove_empty([root / "rooms"])
+    for panorama in own_leftovers(root / ENVIRONMENTS, r"[0-9a-f]{64}\.exr"):
+        panorama.unlink()
+    _remove_empty([root / ENVIRONMENTS, root / "rooms"])
 
 
 @contextmanager
@@ -82,7 +87,7 @@ def claimed(root: Path) -> Iterator[None]:
     try:
         made = [folder for folder in (root, *root.parents) if not folder.exists()]
         root.mkdir(parents=True, exist_ok=True)
-        refuse_links(root, [root / "rooms"])
+        refuse_links(root, [root / "rooms", root / ENVIRONMENTS])
         if not (root / MANIFEST).exists():
             _refuse_foreign(root)
         lock = lock_folder(root)

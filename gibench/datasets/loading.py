@@ -14,9 +14,11 @@ from gibench import gate
 from gibench.datasets.errors import DatasetError, nearest
 from gibench.datasets.exr import decode, present_channels
 from gibench.datasets.folder import TABLE, room_folder, whole_rooms
+from gibench.datasets.lightings import lighting_of
 from gibench.datasets.manifest import frame_table, read_manifest, recipe_of, room_record
 from gibench.datasets.table import read_table
 from gibench.rendering.camera import PinholeCamera
+from gibench.rendering.lighting import Lighting, Shot
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -62,6 +64,16 @@ class Frame:
             for what in ("camera", "target")
         )
         return PinholeCamera(position, target, float(self.row["fov"]))
+
+    @property
+    def lighting(self) -> Lighting:
+        """Its light: `Lighting()` where it is the room's own. An environment is read when its pixels are asked for."""
+        return lighting_of(self.row, self.path.parents[3])
+
+    @property
+    def shot(self) -> Shot:
+        """Its camera and its light."""
+        return Shot(self.camera, self.lighting)
 
     @property
     def camera_to_world(self) -> NDArray[np.float64]:

@@ -88,9 +88,7 @@ def make(
     if workers < 1:
         raise MakingError(f"{workers} workers cannot make anything: ask for 1 or more")
     started = time.perf_counter()
-    work = work or pool.Work(
-        Renderer(variant, default_threads(workers), recipe.environment), RoomMaker(root, recipe)
-    )
+    work = work or pool.Work(Renderer(variant, default_threads(workers), recipe), RoomMaker(root, recipe))
     with folder.claimed(root):
         run = _Run(root, recipe, command, on_progress)
         try:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import ValidationError
 
 from gibench import gate
-from gibench.datasets import records
+from gibench.datasets import lightings, records
 from gibench.datasets.checked import first_problem, parsed, plain, shown
 from gibench.datasets.errors import DatasetError, FolderError
 from gibench.datasets.files import as_json, write_whole
@@ -197,10 +197,14 @@ def frame_table(records: Iterable[Mapping[str, Any]], recipe: Recipe) -> pd.Data
     camera_x … z and target_x … z (m), fov (horizontal, rad), path, step, exposure (for display), largest
     (value of color), spp, paths, invalid_paths (counted as 0), median_error (relative standard error of
     color, before denoising), kernel_seconds, denoise_seconds, denoise_change (by how much denoising changed the mean
-    of a part, where it is most), seconds (all of the renderer's time), seed.
+    of a part, where it is most), seconds (all of the renderer's time), seed. Where frames have light of their own, also
+    those of `lightings.COLUMNS`: lighting ("area-light" or "environment"), light_x … z (centre, m), light_direction_x …
+    z, light_up_x … z (unit), light_width, light_height (m), light_red … blue (radiance), environment (its name),
+    environment_sha256 (of its pixels), environment_rotation (about Z, rad).
     """
     import pandas as pd
 
+    columns = columns_of(recipe)
     rows = [
         {
             "room": record["room"],
@@ -228,14 +232,15 @@ def frame_table(records: Iterable[Mapping[str, Any]], recipe: Recipe) -> pd.Data
             "denoise_change": frame.get("denoise_change"),  # rooms of older versions have none
             "seconds": frame["seconds"],
             "seed": frame["seed"],
+            **({} if recipe.lighting == "own" else lightings.columns_of(frame.get("lighting"))),
         }
         for record in records
         for frame in record["frames"]
     ]
-    return pd.DataFrame(rows, columns=list(COLUMNS)).astype(COLUMNS)
+    return pd.DataFrame(rows, columns=list(columns)).astype(columns)
 
 
-#: Columns of `frames.parquet` and their types.
+#: Columns of `frames.parquet` and their types, whatever the recipe.
 COLUMNS = {
     "room": "int64",
     "view": "int64",
@@ -262,6 +267,11 @@ COLUMNS = {
     "seconds": "float64",
     "seed": "int64",
 }
+
+
+def columns_of(recipe: Recipe) -> dict[str, str]:
+    """Columns of `frames.parquet` and their types."""
+    return COLUMNS if recipe.lighting == "own" else COLUMNS | lightings.COLUMNS
 
 
 def write_manifest(root: Path, manifest: Mapping[str, Any]) -> None:

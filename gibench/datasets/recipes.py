@@ -16,6 +16,8 @@ from gibench.datasets.errors import RecipeError, nearest
 from gibench.rendering import channels as contract
 
 if TYPE_CHECKING:
+    from gibench.generators.cameras import PathPlan
+    from gibench.generators.environments.files import EnvironmentFile
     from gibench.generators.imported.scene import ImportSettings
 
 #: Environments that are no file: what `sample_room` would choose itself, sun and sky, or darkness outside.
@@ -34,6 +36,20 @@ OPTIONS = {
 
 # Lists in TOML become tuples here: a recipe is a value that can be compared and hashed.
 Names = Annotated[tuple[str, ...], Field(strict=False, min_length=1)]
+
+
+Kind = Literal["walk", "orbit", "eight"]
+Moves = Literal["camera", "light", "both"]
+
+
+class Sequence(BaseModel):
+    """A named sequence of frames of every room."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+    views: int = Field(ge=1, le=9999)
+    path: Kind = "walk"
+    moves: Moves = "camera"
 
 
 class Recipe(BaseModel):
@@ -103,6 +119,18 @@ class Recipe(BaseModel):
         le=9999,
         description="an integer from 0 to 9999 (of the stills, the last ones, which are rendered with the path)",
     )
+    path_moves: Moves = Field("camera", description='"camera", "light" or "both" (what moves along the path)')
+    sequences: dict[Annotated[str, Field(min_length=1)], Sequence] = Field(
+        {},
+        description="a table of names, each of a table of views (from 1), path and moves (as path_moves)",
+    )
+    lighting: Literal["own", "area-light", "environments"] = Field(
+        "own",
+        description='"own" (the room\'s lamps and windows), "area-light" or "environments" (one of its own a frame)',
+    )
+    environments: Annotated[tuple[str, ...], Field(strict=False)] = Field(
+        (), description="a set of maps that ship, such as indoor or outdoor, a folder, or a list of maps"
+    )
     rendered: Literal["all", "stills", "path"] = Field(
         "all", description='"all", "stills" or "path" (which of the frames of a room are rendered)'
     )
@@ -148,14 +176,46 @@ class Recipe(BaseModel):
             )
         return self
 
+    @field_validator("environments", mode="before")
+    @classmethod
+    def _one_is_a_list_too(cls, environments: Any) -> Any:
+        return (environments,) if isinstance(environments, str) else environments
+
+    @model_validator(mode="before")
+    @classmethod
+    def _default_environments(cls, values: Any) -> Any:
+        if isinstance(values, dict) and values.get("lighting") == "environments":
+            return {**values, "environments": values.get("environments") or ("indoor",)}
+        return values
+
+    @model_validator(mode="after")
+    def _light_that_can_be(self) -> Self:
+        if self.environments and self.lighting != "environments":
+            raise PydanticCustomError(
+                "lighting", 'environments is set, but not the lighting: set lighting to "environments"'
+            )
+        moving = self.path_moves != "camera" or any(s.moves != "camera" for s in self.sequences.values())
+        if moving and self.lighting == "own":
+            raise PydanticCustomError(
+                "lighting",
+                'light moves on a path, but the room keeps its own: set lighting to "area-light" or "environments"',
+            )
+        if self.path_moves != "camera" and self.path == "stills":
+            raise PydanticCustomError("path", "path_moves needs a path: set path to walk, orbit or eight")
+        return self
+
     @model_validator(mode="after")
     def _frames_that_can_be(self) -> Self:
+        if self.sequences and self.path != "stills":
+            raise PydanticCustomError(
+                "path", "path and sequences are both set: leave path out, and make it one of the sequences"
+            )
         if self.path_views and self.path == "stills":
             raise PydanticCustomError("path", "path_views needs a path: set path to walk, orbit or eight")
-        if self.rendered != "all" and not (self.path_views or self.held_out):
+        if self.rendered != "all" and not (self.path_frames or self.held_out):
             raise PydanticCustomError(
                 "rendered",
-                f'rendered is "{self.rendered}", but only rooms with path_views or held_out have both kinds',
+                f'rendered is "{self.rendered}", but only rooms with path_views, sequences or held_out have both kinds',
             )
         if self.held_out > self.views:
             raise PydanticCustomError("held_out", f"held_out is {self.held_out} of {self.views} views")
@@ -169,7 +229,7 @@ class Recipe(BaseModel):
                     raise PydanticCustomError(
                         "scenes", "{key} is set, but only scenes have it: set scenes too", {"key": key}
                     )
-            if self.views == 0:
+            if self.views == 0 and not self.sequences:
                 raise PydanticCustomError(
                     "views",
                     "0 is not allowed: only scenes have cameras of their own; allowed is an integer from 1",
@@ -180,16 +240,34 @@ class Recipe(BaseModel):
             )
         return self
 
+    def plans(self) -> tuple[PathPlan, ...]:
+        """Sequences of a room that come after its views, in order."""
+        from gibench.generators.cameras import PathPlan
+
+        if self.path_views:
+            return (PathPlan(self.path, self.path, self.path_views, self.path_moves),)
+        return tuple(PathPlan(name, s.path, s.views, s.moves) for name, s in self.sequences.items())
+
+    @property
+    def path_frames(self) -> int:
+        """Frames of a room on sequences that come after its views."""
+        return self.path_views + sum(sequence.views for sequence in self.sequences.values())
+
+    def moves(self) -> dict[str, str]:
+        """What moves along a path, by the name that its frames bear."""
+        moves: dict[str, str] = {plan.name: plan.moves for plan in self.plans()}
+        return moves if self.path == "stills" else {**moves, self.path: self.path_moves}
+
     def rendered_views(self, given: int = 0, room: int = 0) -> range:
         """Numbers of the views of a room that are rendered.
 
         First come the cameras that it brings along, `given` of them, which count as stills; then the stills, then those
-        on the path beside them. Of the stills the last `held_out` go with the path.
+        on paths beside them. Of the stills the last `held_out` go with the paths.
         """
         stills = given + self.views
         apart = stills - self.held_out
         has_path = self.path_rooms is None or room < self.path_rooms
-        last = stills + (self.path_views if has_path else 0)
+        last = stills + (self.path_frames if has_path else 0)
         return range(apart if self.rendered == "path" else 0, apart if self.rendered == "stills" else last)
 
     @field_validator("kinds")
@@ -231,7 +309,7 @@ class Recipe(BaseModel):
         # Datasets that were begun before these keys existed hold the same frames.
         if not self.path_views:
             del values["path_views"]
-        if not (self.path_views or self.held_out):
+        if not (self.path_frames or self.held_out):
             del values["rendered"]
         if not self.held_out:
             del values["held_out"]
@@ -239,6 +317,13 @@ class Recipe(BaseModel):
             del values["path_rooms"]
         if not self.sample_seed:
             del values["sample_seed"]
+        for key in ("path_moves", "sequences", "lighting", "environments"):
+            if not values[key] or values[key] == type(self).model_fields[key].default:
+                del values[key]
+        if self.environments:
+            values["environments"] = {
+                file.name: f"sha256:{file_sha256(file.path)}" for file in self.environment_files()
+            }
         if self.environment not in ENVIRONMENTS:
             values["environment"] = f"sha256:{file_sha256(Path(self.environment))}"
         if self.scenes:
@@ -253,6 +338,16 @@ class Recipe(BaseModel):
             for key in ("scenes", "up", "scale", "allow_missing", "allow_outside", "cameras"):
                 del values[key]
         return values
+
+    def environment_files(self) -> tuple[EnvironmentFile, ...]:
+        """The maps that frames are lit by. Raises `RecipeError` for a name that is none, or a folder without one."""
+        from gibench.generators.daylight import BadEnvironment
+        from gibench.generators.environments.files import environment_files
+
+        try:
+            return environment_files(self.environments)
+        except BadEnvironment as problem:
+            raise RecipeError(str(problem)) from None
 
     def import_settings(self) -> ImportSettings:
         """How the scene files are read."""
@@ -304,6 +399,13 @@ def load_recipe(path: Path, overrides: Mapping[str, Any] | None = None) -> Recip
     environment = values.get("environment")
     if isinstance(environment, str) and environment not in ENVIRONMENTS:
         values["environment"] = str((path.parent / environment).resolve())
+    if isinstance(maps := values.get("environments"), str | list):
+        # The name of a map that ships is no file beside the recipe, or that file is meant.
+        asked = [maps] if isinstance(maps, str) else [name for name in maps if isinstance(name, str)]
+        beside = [path.parent / name for name in asked]
+        values["environments"] = [
+            str(file.resolve()) if file.exists() else name for name, file in zip(asked, beside, strict=True)
+        ]
     if isinstance(scenes := values.get("scenes"), list):
         values["scenes"] = [
             str((path.parent / scene).resolve()) for scene in scenes if isinstance(scene, str)
@@ -340,6 +442,8 @@ def _validated(values: dict[str, Any], source: str, options: frozenset[str] = fr
     if recipe.environment not in ENVIRONMENTS and not Path(recipe.environment).is_file():
         near = nearest(recipe.environment, ENVIRONMENTS)
         raise RecipeError(f"{source}: environment: there is no file {recipe.environment}; {near}")
+    if recipe.environments:
+        recipe.environment_files()
     for scene in recipe.scenes:
         if not Path(scene).is_file():
             raise RecipeError(f"{_place('scenes', source, options)}: there is no scene file {scene}")

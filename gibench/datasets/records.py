@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from gibench.datasets.checked import Amount, Checked, Count, Fingerprint
+from gibench.datasets.checked import Amount, Checked, Count, Fingerprint, Sha256
 
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 RoomNumber = Annotated[str, Field(pattern=r"^[0-9]{1,9}$")]
@@ -62,6 +62,27 @@ class Manifest(Checked):
     totals: Totals | None = None
 
 
+class AreaLightRecord(Checked):
+    """The light of a frame: a rectangle."""
+
+    kind: Literal["area-light"]
+    centre: Vector
+    direction: Vector
+    up: Vector
+    width: Amount
+    height: Amount
+    radiance: Vector
+
+
+class EnvironmentRecord(Checked):
+    """The light of a frame: a panorama."""
+
+    kind: Literal["environment"]
+    environment: str
+    sha256: Sha256
+    rotation: float
+
+
 class FrameRecord(Checked):
     """A frame of a room."""
 
@@ -84,6 +105,7 @@ class FrameRecord(Checked):
     denoise_seconds: Amount
     seconds: Amount
     seed: Count
+    lighting: Annotated[AreaLightRecord | EnvironmentRecord, Field(discriminator="kind")] | None = None
 
 
 class Laps(Checked):

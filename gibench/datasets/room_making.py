@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -22,13 +23,20 @@ from gibench.datasets import exr
 from gibench.datasets.errors import RecipeError, StorageError
 from gibench.datasets.files import as_json, sync_tree
 from gibench.datasets.folder import RECORD, partial_folder, room_folder
+from gibench.datasets.lightings import keep_panorama
 from gibench.datasets.recipes import ENVIRONMENTS, Recipe
 from gibench.datasets.splits import split_of
-from gibench.generators.parts import Camera, Room
+from gibench.generators.parts import Room
+from gibench.generators.scene_files import lighting_record
+from gibench.generators.shots import shot_before, shot_of
+from gibench.rendering.panoramas import Panorama
 
 if TYPE_CHECKING:
+    from gibench.generators.environments.files import EnvironmentFile
     from gibench.generators.imported.room import ImportedRoom
+    from gibench.rendering.light_rig import LightRig
     from gibench.rendering.render import RenderedFrame
+    from gibench.rendering.scene import Scene
 
 #: Lane of the random numbers that rendering draws; far above those that the generators spawn for a room.
 RENDER_LANE = 1000
@@ -41,13 +49,12 @@ GENERATING = ("numpy", "scipy", "shapely", "trimesh", "colour-science")
 class Renderer:
     """Makes a worker ready; the answer says what will make the pixels.
 
-    threads: CPU threads that this worker may use. environment: that of the recipe, whose file is looked through
-    before anything is made.
+    threads: CPU threads that this worker may use. recipe: its environments are looked through before anything is made.
     """
 
     variant: str
     threads: int
-    environment: str
+    recipe: Recipe
 
     def __call__(self) -> dict[str, Any]:
         """Return `variant`, `versions` and `gpu`. Raises `BackendError`, and `RecipeError` for a bad environment."""
@@ -56,11 +63,12 @@ class Renderer:
 
         variant = backend.select_variant(self.variant)
         backend.limit_threads(self.threads)
-        if self.environment not in ENVIRONMENTS:
+        if self.recipe.environment not in ENVIRONMENTS:
             try:
-                hdr(path=self.environment, rotation=0.0, lux=1.0)
+                hdr(path=self.recipe.environment, rotation=0.0, lux=1.0)
             except BadEnvironment as problem:
                 raise RecipeError(f"environment: {problem}") from None
+        panoramas_of(self.recipe)
         versions = {"gibench": gibench.__version__}
         versions |= {name: importlib.metadata.version(name) for name in GENERATING}
         return {
@@ -85,8 +93,36 @@ def given_cameras(recipe: Recipe, room: int) -> int:
     return len(import_scene(Path(recipe.scenes[room]), recipe.import_settings()).cameras)
 
 
+@lru_cache(maxsize=1)
+def _panoramas(files: tuple[EnvironmentFile, ...]) -> tuple[Panorama, ...]:
+    from gibench.generators.daylight import BadEnvironment
+    from gibench.generators.environments.files import read_environment
+
+    try:
+        return tuple(Panorama.of(file.name, read_environment(file.path)) for file in files)
+    except BadEnvironment as problem:
+        raise RecipeError(f"environments: {problem}") from None
+
+
+def panoramas_of(recipe: Recipe) -> tuple[Panorama, ...]:
+    """The environments of a recipe, none where it has none. Raises `RecipeError` for one that lights nothing."""
+    return _panoramas(recipe.environment_files()) if recipe.environments else ()
+
+
 def sampled_room(recipe: Recipe, room: int) -> Room | ImportedRoom:
-    """Build or import room number `room` of a recipe; nothing is written. Raises `RejectedRoom`, `SceneFileError`."""
+    """Build or import room number `room` of a recipe, with the light of its frames; nothing is written.
+
+    Raises `RejectedRoom`, `SceneFileError`.
+    """
+    from gibench.generators.shots import Environments, lit
+
+    built = _sampled(recipe, room)
+    if recipe.lighting == "environments":
+        return lit(built, Environments(panoramas_of(recipe)), recipe.moves())
+    return built
+
+
+def _sampled(recipe: Recipe, room: int) -> Room | ImportedRoom:
     if recipe.scenes:
         from gibench.generators.imported.room import import_room
         from gibench.generators.imported.scene import import_scene
@@ -97,8 +133,8 @@ def sampled_room(recipe: Recipe, room: int) -> Room | ImportedRoom:
             seed=recipe.seed,
             index=room,
             views=recipe.views,
-            path=None if recipe.path == "stills" else recipe.path,
-            path_views=recipe.path_views,
+            path=None if recipe.path == "stills" or recipe.path_views else recipe.path,
+            sequences=recipe.plans(),
         )
     from gibench.generators.rooms import sample_room
 
@@ -107,8 +143,8 @@ def sampled_room(recipe: Recipe, room: int) -> Room | ImportedRoom:
         room,
         kinds=recipe.kinds,
         views=recipe.views,
-        path=None if recipe.path == "stills" else recipe.path,
-        path_views=recipe.path_views,
+        path=None if recipe.path == "stills" or recipe.path_views else recipe.path,
+        sequences=recipe.plans(),
         environment=None if recipe.environment == "auto" else recipe.environment,
     )
 
@@ -131,38 +167,55 @@ def written_room(room: Room | ImportedRoom, folder: Path, recipe: Recipe) -> Non
         write_room(cast(Room, room), folder, **settings)
 
 
-def rendered_frame(
-    recipe: Recipe, scene: Any, room: Room | ImportedRoom, view: int, **settings: Any
-) -> RenderedFrame:
-    """Render one view of a room with a recipe's settings, or with other `settings` of `render_frame`."""
-    from gibench.rendering.camera import PinholeCamera
-    from gibench.rendering.render import render_frame
+@dataclass(frozen=True)
+class LoadedRoom:
+    """A room that is ready to be rendered. rig: None where all frames have the room's own light."""
 
-    def pinhole(camera: Camera) -> PinholeCamera:
-        return PinholeCamera(camera.position, camera.target, camera.fov)
+    recipe: Recipe
+    room: Room | ImportedRoom
+    scene: Scene
+    rig: LightRig | None
 
-    camera = room.cameras[view]
-    before = room.cameras[view - 1] if view > 0 else None
-    follows = (
-        before is not None and camera.path and (before.path, before.step) == (camera.path, camera.step - 1)
-    )
-    samples = (
-        {"spp": recipe.spp} if recipe.error is None else {"error": recipe.error, "spp_cap": recipe.spp_cap}
-    )
-    return render_frame(
-        scene,
-        pinhole(camera),
-        **{
-            "resolution": recipe.resolution,
-            "channels": recipe.channels,
-            "seed": frame_seed(recipe, room.index, view),
-            "max_depth": recipe.max_depth,
-            "denoise": recipe.denoise,
-            "previous_camera": pinhole(before) if before is not None and follows else None,
-            **samples,
-            **settings,
-        },
-    )
+    @classmethod
+    def of(cls, recipe: Recipe, room: Room | ImportedRoom, folder: Path) -> LoadedRoom:
+        """From the folder that it was written into."""
+        from gibench.rendering.scene import load_scene
+
+        scene = load_scene(folder / "scene.xml", share_kernels=True)
+        if not room.lightings:
+            return cls(recipe, room, scene, None)
+        from gibench.rendering.light_rig import LightRig
+
+        rig = LightRig(scene, panoramas=recipe.lighting == "environments")
+        return cls(recipe, room, rig.scene, rig)
+
+    def rendered(self, view: int, **settings: Any) -> RenderedFrame:
+        """Render one view with the recipe's settings, or with other `settings` of `render_frame`."""
+        from gibench.rendering.render import render_frame
+
+        recipe, room = self.recipe, self.room
+        shot, before = shot_of(room, view), shot_before(room, view)
+        if self.rig is not None:
+            self.rig.set(shot.lighting)
+        samples = (
+            {"spp": recipe.spp}
+            if recipe.error is None
+            else {"error": recipe.error, "spp_cap": recipe.spp_cap}
+        )
+        return render_frame(
+            self.scene,
+            shot.camera,
+            **{
+                "resolution": recipe.resolution,
+                "channels": recipe.channels,
+                "seed": frame_seed(recipe, room.index, view),
+                "max_depth": recipe.max_depth,
+                "denoise": recipe.denoise,
+                "previous_camera": None if before is None else before.camera,
+                **samples,
+                **settings,
+            },
+        )
 
 
 @dataclass(frozen=True)
@@ -197,15 +250,13 @@ class RoomMaker:
         return record
 
     def _filled(self, folder: Path, number: int, report: Callable[[str, Any], None]) -> dict[str, Any]:
-        from gibench.rendering.scene import load_scene
-
         recipe = self.recipe
         clock = Stopwatch()
         room = sampled_room(recipe, number)
         clock.lap("build")
         written_room(room, folder, recipe)
         clock.lap("write")
-        scene = load_scene(folder / "scene.xml", share_kernels=True)
+        loaded = LoadedRoom.of(recipe, room, folder)
         clock.lap("load")
         files = {
             str(path.relative_to(folder).as_posix()): _fingerprint(path.read_bytes())
@@ -213,13 +264,16 @@ class RoomMaker:
             if path.is_file()
         }
         (folder / "frames").mkdir()
+        for lighting in dict.fromkeys(room.lightings):
+            if lighting.environment is not None:
+                keep_panorama(self.root, lighting.environment.panorama)
         given = given_cameras(recipe, number)
         frames: list[Future[dict[str, Any]]] = []
         # Compressing and writing a frame goes on while the next one renders. One frame at most waits for it,
         # so memory does not grow with the number of views.
         with ThreadPoolExecutor(max_workers=1) as writer:
             for view in recipe.rendered_views(given, number):
-                rendered = rendered_frame(recipe, scene, room, view)
+                rendered = loaded.rendered(view)
                 report("frame", {"paths": rendered.paths, "seconds": rendered.kernel_seconds})
                 if frames:
                     frames[-1].result()
@@ -231,8 +285,8 @@ class RoomMaker:
             "kind": room.kind,
             "split": split_of(number, recipe.splits),
             "given_cameras": given,
-            "materials": list(scene.materials),
-            "shapes": list(scene.shapes),
+            "materials": list(loaded.scene.materials),
+            "shapes": list(loaded.scene.shapes),
             "rejections": dict(room.rejections),
             "seconds": clock.laps,
             "frames": records,
@@ -261,6 +315,7 @@ class RoomMaker:
             "fov": camera.fov,
             "path": camera.path,
             "step": camera.step,
+            **({"lighting": lighting_record(room.lightings[view])} if room.lightings else {}),
             "exposure": None if color is None else float(reference_exposure(color)),
             "largest": None if color is None else float(color.max()),
             "spp": rendered.spp,

@@ -15,7 +15,7 @@ from gibench import gate
 from gibench.datasets.checked import shown
 from gibench.datasets.errors import DatasetError
 from gibench.datasets.folder import TABLE
-from gibench.datasets.manifest import COLUMNS
+from gibench.datasets.manifest import columns_of
 from gibench.datasets.recipes import Recipe
 
 if TYPE_CHECKING:
@@ -46,12 +46,12 @@ FILE = r"rooms/[0-9]{6,9}/frames/[0-9]{4,6}\.exr"
 
 def read_table(root: Path, recipe: Recipe) -> pd.DataFrame:
     """Read the table of a dataset. Raises `gate.GateError` (`missing` where there is none) and `DatasetError`."""
-    path = gate.inside(root, TABLE)
+    path, columns = gate.inside(root, TABLE), columns_of(recipe)
     problem = None
     try:
         problem = next(_footer_problems(root, path, recipe), None)
-        frames = None if problem else _read(path)
-        problem = problem or next(_problems(frames), None)
+        frames = None if problem else _read(path, columns)
+        problem = problem or next(_problems(frames, columns), None)
     except Exception as failure:  # Arrow raises whatever its C++ side threw
         problem = " ".join(str(failure).split())[:200]
     if problem or frames is None:
@@ -61,13 +61,13 @@ def read_table(root: Path, recipe: Recipe) -> pd.DataFrame:
     return frames
 
 
-def _read(path: Path) -> pd.DataFrame:
+def _read(path: Path, columns: dict[str, str]) -> pd.DataFrame:
     import pandas as pd
     import pyarrow.compute as pc
     import pyarrow.parquet as pq
 
     there = pq.read_schema(path).names
-    texts = [name for name, dtype in COLUMNS.items() if dtype == "str" and name in there]
+    texts = [name for name, dtype in columns.items() if dtype == "str" and name in there]
     # As dictionaries, so that a long text that stands in every row is looked at once.
     with pq.ParquetFile(path, read_dictionary=texts) as file:
         for name, column in zip(texts, file.read(columns=texts).columns, strict=True):
@@ -76,10 +76,10 @@ def _read(path: Path) -> pd.DataFrame:
                 if longest > LONGEST_TEXT:
                     raise ValueError(f"column {name} holds a text of {longest} bytes")
     frames = pd.read_parquet(path)
-    for name, dtype in COLUMNS.items():
+    for name, dtype in columns.items():
         if name not in there:
             frames[name] = pd.Series({"str": "", "int64": 0, "float64": math.nan}[dtype], frames.index, dtype)
-    return frames[[*COLUMNS, *(name for name in there if name not in COLUMNS)]]
+    return frames[[*columns, *(name for name in there if name not in columns)]]
 
 
 def _footer_problems(root: Path, path: Path, recipe: Recipe) -> Iterator[str]:
@@ -87,13 +87,13 @@ def _footer_problems(root: Path, path: Path, recipe: Recipe) -> Iterator[str]:
 
     with pq.ParquetFile(path, thrift_string_size_limit=2**24, thrift_container_size_limit=10**6) as file:
         footer, schema = file.metadata, file.schema_arrow
-    names = list(schema.names)
+    names, columns = list(schema.names), columns_of(recipe)
     if len(set(names)) < len(names) or len(names) > 1000:
         yield "its columns are not told apart"
     for name in ALWAYS:
         if name not in names:
             yield f"it has no column {name}"
-    for name, dtype in COLUMNS.items():
+    for name, dtype in columns.items():
         if name not in names:
             continue
         there = str(schema.field(name).type)
@@ -125,8 +125,8 @@ def _frame_files(root: Path) -> int:
     return sum(1 for _ in root.glob("rooms/*/frames/*.exr"))
 
 
-def _problems(frames: Any) -> Iterator[str]:
-    for name, dtype in COLUMNS.items():
+def _problems(frames: Any, columns: dict[str, str]) -> Iterator[str]:
+    for name, dtype in columns.items():
         kinds = {"str": "OUT", "int64": "iu", "float64": "f"}[dtype]
         if frames[name].dtype.kind not in kinds or (dtype != "float64" and frames[name].isna().any()):
             yield f"its column {name} has rows without a value"

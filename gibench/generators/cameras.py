@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -31,6 +32,23 @@ PATH_TRIES = 40  # curves before a room is given up
 SHARPEST_BEND = 0.3  # turn of a walk within a sixtieth of its length, radians
 PATHS = ("walk", "orbit", "eight")
 LEAST_DIFFERENCE = 0.7  # between two stills of a room, as `_difference` counts it
+
+
+@dataclass(frozen=True)
+class PathPlan:
+    """A sequence of frames of a room, by its name. kind: one of PATHS. moves: "camera", "light" or "both".
+
+    Where the light alone moves the camera stands still.
+    """
+
+    name: str
+    kind: str
+    frames: int
+    moves: str = "camera"
+
+    def named(self, cameras: Sequence[Camera]) -> tuple[Camera, ...]:
+        """Its cameras, in order, with its name."""
+        return tuple(replace(camera, path=self.name, step=step) for step, camera in enumerate(cameras))
 
 
 class NoView(GibenchError):
@@ -172,6 +190,18 @@ def sample_path(
             return tuple(cameras), refused
         refused[f"{kind}: {reason}"] += 1
     raise NoView(kind, refused)
+
+
+def sample_planned(
+    rng: np.random.Generator, stage: Stage, plan: PathPlan
+) -> tuple[tuple[Camera, ...], Counter[str]]:
+    """Draw the cameras of a sequence, which bear its name. Returns and raises what `sample_path` does."""
+    if plan.moves == "light":
+        (still,), refused = sample_stills(rng, stage, 1)
+        drawn: tuple[Camera, ...] = (still,) * plan.frames
+    else:
+        drawn, refused = sample_path(rng, stage, plan.kind, plan.frames)
+    return plan.named(drawn), refused
 
 
 Curve = tuple[FloatArray, FloatArray]  # (N, 2) places and (N,) yaws

@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gibench.rendering.lighting import Lighting
+
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 
@@ -175,7 +177,9 @@ class Room:
 
     kind: "living", "bedroom", "dining-kitchen", "office" or "bathroom". parameters: the shell's and whatever
     else reproduces it. openings: (N, 3, 3) windows, each as corner and two edges whose cross product points inside,
-    metres. rejections: reason → count, for tries of the room and of its views.
+    metres. rejections: reason → count, for tries of the room and of its views. lightings: one a camera, or none where
+    all frames have the room's own light.
+    lightings: one a camera, or none where all frames have the room's own light.
     """
 
     seed: int
@@ -189,3 +193,4 @@ class Room:
     cameras: tuple[Camera, ...]
     openings: FloatArray = field(default_factory=lambda: np.zeros((0, 3, 3)))
     rejections: Mapping[str, int] = field(default_factory=dict)
+    lightings: tuple[Lighting, ...] = ()

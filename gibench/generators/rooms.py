@@ -9,7 +9,15 @@ from typing import Any
 import numpy as np
 
 from gibench.errors import GibenchError
-from gibench.generators.cameras import PATHS, NoView, Stage, sample_path, sample_stills
+from gibench.generators.cameras import (
+    PATHS,
+    NoView,
+    PathPlan,
+    Stage,
+    sample_path,
+    sample_planned,
+    sample_stills,
+)
 from gibench.generators.daylight import sample_daylight
 from gibench.generators.layouts import FURNISH
 from gibench.generators.layouts.placement import Placed, Plan, RejectedRoom
@@ -62,6 +70,7 @@ def sample_room(
     views: int = 4,
     path: str | None = None,
     path_views: int = 0,
+    sequences: Sequence[PathPlan] = (),
     environment: Environment | str | None = None,
     **fixed: Any,
 ) -> Room:
@@ -69,8 +78,9 @@ def sample_room(
 
     kind: of the room, one of ALL_KINDS; drawn from `kinds` if None. views: number of cameras. path: None for stills, or
     "walk", "orbit" or "eight" for one path of that many frames. path_views: cameras on the path in a room that has
-    stills too: above 0 the `views` are stills, as without a path, and these come after them. environment: what lies
-    outside: "none", "sunsky", the path of an HDR panorama, or an Environment; drawn if None.
+    stills too: above 0 the `views` are stills, as without a path, and these come after them. sequences: the same for
+    any number of paths by name, in place of `path`. environment: what lies outside: "none", "sunsky", the path of an
+    HDR panorama, or an Environment; drawn if None.
     fixed: arguments of `build_shell` that are not drawn, such as width=4.0.
 
     A try that fails is counted in `Room.rejections` by its reason and drawn again. Raises RejectedRoom when all
@@ -83,13 +93,15 @@ def sample_room(
         raise UnknownKind(f"there is no camera path {path!r}; choose from {', '.join(PATHS)}")
     if path_views and path is None:
         raise UnknownKind(f"{path_views} cameras on no path: choose path from {', '.join(PATHS)}")
+    if path is not None and path_views:
+        sequences, path = (PathPlan(path, path, path_views),), None
     rejections: Counter[str] = Counter()
     if kind is None:
         kind = kinds[int(_lane(seed, index, "kind", 0).integers(len(kinds)))]
     for attempt in range(TRIES):
         try:
             room = _try_room(
-                seed, index, attempt, kind, views, path, path_views, environment, fixed, rejections
+                seed, index, attempt, kind, views, path, sequences, environment, fixed, rejections
             )
         except RejectedRoom as refusal:
             rejections[refusal.reason] += 1
@@ -105,12 +117,14 @@ def sample_room(
     )
 
 
-def _lane_seed(seed: int, index: int, lane: str, attempt: int) -> np.random.SeedSequence:
-    return np.random.SeedSequence(seed, spawn_key=(index, LANES.index(lane), attempt))
+def _lane_seed(seed: int, index: int, lane: str, attempt: int, number: int = 0) -> np.random.SeedSequence:
+    """number: of several things that one lane draws."""
+    key = (index, LANES.index(lane), attempt, *([number] if number else []))
+    return np.random.SeedSequence(seed, spawn_key=key)
 
 
-def _lane(seed: int, index: int, lane: str, attempt: int) -> np.random.Generator:
-    return np.random.default_rng(_lane_seed(seed, index, lane, attempt))
+def _lane(seed: int, index: int, lane: str, attempt: int, number: int = 0) -> np.random.Generator:
+    return np.random.default_rng(_lane_seed(seed, index, lane, attempt, number))
 
 
 def _try_room(
@@ -120,13 +134,13 @@ def _try_room(
     kind: str,
     views: int,
     path: str | None,
-    path_views: int,
+    sequences: Sequence[PathPlan],
     environment: Environment | str | None,
     fixed: Mapping[str, Any],
     rejections: Counter[str],
 ) -> Room:
-    def lane(name: str) -> np.random.Generator:
-        return _lane(seed, index, name, attempt)
+    def lane(name: str, number: int = 0) -> np.random.Generator:
+        return _lane(seed, index, name, attempt, number)
 
     if kind == still_life.KIND:
         return still_life.build_still_life(
@@ -136,7 +150,7 @@ def _try_room(
             lane,
             views=views,
             path=path,
-            path_views=path_views,
+            sequences=sequences,
             environment=environment,
         )
     shell = sample_shell(lane("shell"), kind, **fixed)
@@ -154,12 +168,12 @@ def _try_room(
     objects = _objects(plan, palette)
 
     stage = Stage(free, shell.height, _middles(plan), _caster(plan), len(shell.pieces))
-    if path is None or path_views:
-        cameras, refused = sample_stills(lane("cameras"), stage, views)
+    if path is None:
+        cameras, refused = sample_stills(lane("cameras"), stage, views) if views else ((), Counter())
     else:
         cameras, refused = sample_path(lane("cameras"), stage, path, views)
-    if path is not None and path_views:
-        walked, refused_too = sample_path(lane("path"), stage, path, path_views)
+    for number, sequence in enumerate(sequences):
+        walked, refused_too = sample_planned(lane("path", number), stage, sequence)
         cameras, refused = cameras + walked, refused + refused_too
     rejections.update({f"view: {reason}": count for reason, count in refused.items()})
 

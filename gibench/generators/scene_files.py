@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
@@ -23,6 +24,7 @@ from gibench.generators.outside import GROUND, ground_element
 from gibench.generators.panorama import write_panorama
 from gibench.generators.parts import Camera, Environment, FloatArray, Light, Mesh, Room, Texture
 from gibench.rendering.camera import PinholeCamera
+from gibench.rendering.lighting import Lighting
 from gibench.rendering.scene import OPENINGS
 
 PANORAMA = "textures/environment.hdr"  # what lies outside the windows
@@ -226,6 +228,7 @@ def describe(room: Room) -> dict[str, Any]:
             for name, material in room.materials.items()
         },
         "cameras": camera_records(room.cameras),
+        **lighting_records(room.lightings),
         "rejections": dict(sorted(room.rejections.items())),
     }
 
@@ -248,6 +251,27 @@ def camera_records(cameras: Sequence[Camera]) -> list[dict[str, Any]]:
         }
         for camera in cameras
     ]
+
+
+def lighting_records(lightings: Sequence[Lighting]) -> dict[str, Any]:
+    """What room.json says of the light of each camera, in the same order; nothing where all have the room's own."""
+    return {"lightings": [lighting_record(lighting) for lighting in lightings]} if lightings else {}
+
+
+def lighting_record(lighting: Lighting) -> dict[str, Any]:
+    """A lighting as JSON-able values. An environment is known by its name and the SHA-256 of its pixels."""
+    if lighting.area is not None:
+        return {"kind": lighting.kind, **asdict(lighting.area)}
+    if lighting.environment is not None:
+        panorama = lighting.environment.panorama
+        rotation = lighting.environment.rotation
+        return {
+            "kind": lighting.kind,
+            "environment": panorama.name,
+            "sha256": panorama.sha256,
+            "rotation": rotation,
+        }
+    return {"kind": lighting.kind}
 
 
 def _plain(value: Any) -> Any:

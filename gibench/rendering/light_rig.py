@@ -196,7 +196,7 @@ class LightRig:
             self._parameters[lamp.weight] = lamp.sampling if own else 0.0
         lit = area or (own and any(lamp.sampling > 0 for lamp in self._lamps))
         if self._own_sky is not None:
-            self._parameters[f"{SKY}.sampling_weight"] = float(sky)
+            self._parameters[f"{SKY}.sampling_weight"] = self._own_sky.sampling if sky else 0.0
             lit |= sky
         # Something must be drawn where all is dark. Everything at 1 would be drawn by other code than weights are, so
         # there is always a light of weight 0.
@@ -211,6 +211,7 @@ class _Sky:
     """
 
     bright: bool = False
+    sampling: float = 1.0
     scale: float = 1.0
     to_world: NDArray[np.float64] = field(default_factory=lambda: np.eye(4))
     pixels: NDArray[np.float32] = field(default_factory=lambda: _around(_CONSTANT))
@@ -223,14 +224,15 @@ class _Sky:
         if emitter is None:
             return cls()
         parameters = mi.traverse(emitter)
+        sampling = float(parameters["sampling_weight"])
         if "data" in parameters and "scale" in parameters:
             pixels = np.array(parameters["data"])
             scale = float(np.ravel(np.array(parameters["scale"]))[0])
             matrix = np.array(parameters["to_world"].matrix, dtype=np.float64).reshape(4, 4)
-            return cls(True, scale, matrix, pixels) if scale > 0 and pixels.any() else cls()
+            return cls(True, sampling, scale, matrix, pixels) if scale > 0 and pixels.any() else cls()
         if "radiance.value" in parameters:
             color = np.broadcast_to(np.ravel(np.array(parameters["radiance.value"])), 3).astype(np.float32)
-            return cls(True, pixels=cls().pixels * color) if color.any() else cls()
+            return cls(True, sampling, pixels=cls().pixels * color) if color.any() else cls()
         raise LightingError(
             f"the scene's own environment is a {emitter.class_name()}, which a rig for panoramas does not give back: "
             "make the rig without panoramas, or the environment a panorama"

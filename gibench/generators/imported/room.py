@@ -6,7 +6,7 @@ import json
 import math
 import shutil
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from xml.etree.ElementTree import ElementTree, SubElement, indent
 import numpy as np
 
 from gibench import gate
-from gibench.generators.cameras import NoView, sample_path, sample_stills
+from gibench.generators.cameras import NoView, PathPlan, sample_path, sample_planned, sample_stills
 from gibench.generators.imported.changes import Change
 from gibench.generators.imported.errors import SceneFileError
 from gibench.generators.imported.glb import write_scene_glb
@@ -23,8 +23,9 @@ from gibench.generators.imported.placing import placed_matrix
 from gibench.generators.imported.scene import ImportedScene
 from gibench.generators.imported.tree import Node
 from gibench.generators.parts import Camera, FloatArray
-from gibench.generators.scene_files import camera_records, sensor_element
+from gibench.generators.scene_files import camera_records, lighting_records, sensor_element
 from gibench.rendering.camera import PinholeCamera
+from gibench.rendering.lighting import Lighting
 from gibench.rendering.scene import OPENINGS
 
 STILLS, PATH = 3000, 3001
@@ -36,7 +37,7 @@ class ImportedRoom:
     """A scene with its cameras: its own first, then stills, then those on a path.
 
     index: number in its dataset. openings: (N, 3, 3) rectangles that daylight enters by, as far as they were found.
-    rejections: reason → count, of views.
+    rejections: reason → count, of views. lightings: one a camera, or none where all frames have the scene's own light.
     """
 
     seed: int
@@ -45,6 +46,7 @@ class ImportedRoom:
     cameras: tuple[Camera, ...]
     openings: FloatArray = field(default_factory=lambda: np.zeros((0, 3, 3)))
     rejections: Mapping[str, int] = field(default_factory=dict)
+    lightings: tuple[Lighting, ...] = ()
 
     @property
     def kind(self) -> str:
@@ -61,8 +63,9 @@ def import_room(
     views: int = 4,
     path: str | None = None,
     path_views: int = 0,
+    sequences: Sequence[PathPlan] = (),
 ) -> ImportedRoom:
-    """Choose the cameras of a scene: its own, `views` stills, and a path of `path_views`.
+    """Choose the cameras of a scene: its own, `views` stills, and a path of `path_views`, or several `sequences`.
 
     With a path and no path_views the `views` lie on the path, as in `rooms.sample_room`. The cameras that are drawn
     depend on the seed and the scene alone.
@@ -88,9 +91,9 @@ def import_room(
     openings = find_openings(scene.loaded, found) if len(found) else np.zeros((0, 3, 3))
     cameras = [camera.at(resolution) for camera in scene.cameras]
     rejections: Counter[str] = Counter()
-    stills = views if path is None or path_views else 0
-    on_path = (path_views or views) if path is not None else 0
-    if stills or on_path:
+    if path is not None and path_views:
+        sequences, path = (PathPlan(path, path, path_views),), None
+    if views or sequences:
         from gibench.generators.imported.survey import survey
 
         if not len(found):
@@ -99,13 +102,15 @@ def import_room(
             )
         stage = survey(scene.loaded, found)
         try:
-            if stills:
-                drawn, refused = sample_stills(_rng(seed, STILLS), stage, stills)
-                cameras += drawn
-                rejections.update({f"view: {reason}": count for reason, count in refused.items()})
-            if on_path:
-                assert path is not None
-                drawn, refused = sample_path(_rng(seed, PATH), stage, path, on_path)
+            draws = []
+            if views and path is None:
+                draws.append(sample_stills(_rng(seed, STILLS), stage, views))
+            elif views and path is not None:
+                draws.append(sample_path(_rng(seed, PATH), stage, path, views))
+            for number, sequence in enumerate(sequences):
+                lane = (PATH, number) if number else (PATH,)
+                draws.append(sample_planned(_rng(seed, *lane), stage, sequence))
+            for drawn, refused in draws:
                 cameras += drawn
                 rejections.update({f"view: {reason}": count for reason, count in refused.items()})
         except NoView as refusal:
@@ -143,8 +148,8 @@ def _near_planes_told(scene: ImportedScene, resolution: tuple[int, int]) -> Impo
     return replace(scene, changes=(*scene.changes, *changes)) if changes else scene
 
 
-def _rng(seed: int, lane: int) -> np.random.Generator:
-    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(lane,)))
+def _rng(seed: int, *lane: int) -> np.random.Generator:
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=lane))
 
 
 def write_imported_room(
@@ -233,5 +238,6 @@ def describe(room: ImportedRoom) -> dict[str, Any]:
         },
         "lights": [{"type": node.type, "where": node.where} for node in emitters],
         "cameras": camera_records(room.cameras),
+        **lighting_records(room.lightings),
         "rejections": dict(sorted(room.rejections.items())),
     }

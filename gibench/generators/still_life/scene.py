@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
+from gibench.generators.cameras import PathPlan
 from gibench.generators.daylight import sample_daylight
 from gibench.generators.environments.files import environment_files
 from gibench.generators.layouts.placement import LIFT, RejectedRoom
@@ -52,14 +53,14 @@ def build_still_life(
     seed: int,
     index: int,
     attempt: int,
-    lane: Callable[[str], np.random.Generator],
+    lane: Callable[..., np.random.Generator],
     *,
     views: int,
     path: str | None,
-    path_views: int,
+    sequences: Sequence[PathPlan],
     environment: Environment | str | None,
 ) -> Room:
-    """One try at a still life; arguments as of `rooms.sample_room`. lane: name → its random numbers.
+    """One try at a still life; arguments as of `rooms.sample_room`. lane: name and number → its random numbers.
 
     environment: one of the maps that ship to train on if None. Raises RejectedRoom where the things do not fit.
     """
@@ -90,12 +91,17 @@ def build_still_life(
     corners = np.concatenate([mesh.vertices for mesh in places])
     middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
     radius = float(np.linalg.norm(corners - middle, axis=1).max())
-    if path is None or path_views:
+    if path is None:
         cameras = sample_stills(lane("cameras"), middle, radius, views)
     else:
         cameras = sample_path(lane("cameras"), middle, radius, path, views)
-    if path is not None and path_views:
-        cameras += sample_path(lane("path"), middle, radius, path, path_views)
+    for number, plan in enumerate(sequences):
+        rng = lane("path", number)
+        if plan.moves == "light":
+            drawn = sample_stills(rng, middle, radius, 1) * plan.frames
+        else:
+            drawn = sample_path(rng, middle, radius, plan.kind, plan.frames)
+        cameras += plan.named(drawn)
     glossy = [thing.name for thing in objects[1:] if is_glossy(used[thing.shapes[0][1]])]
     parameters: dict[str, Any] = {"support": support, "attempt": attempt, "glossy": glossy}
     return Room(seed, index, KIND, parameters, tuple(objects), (), environment, used, cameras)

@@ -1,0 +1,100 @@
+"""The light of every frame of a room: an area light or an environment, which moves where its sequence says so."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
+from typing import TYPE_CHECKING, Protocol, TypeVar
+
+import numpy as np
+
+from gibench.generators.parts import Camera, Room
+from gibench.rendering.camera import PinholeCamera
+from gibench.rendering.lighting import EnvironmentMap, Lighting, Shot
+from gibench.rendering.panoramas import Panorama
+
+if TYPE_CHECKING:
+    from gibench.generators.imported.room import ImportedRoom
+
+LANE = 1001
+"""Of the random numbers of lights, far above those that rooms draw from."""
+
+TURN = math.radians(3.0)
+"""Of an environment from one frame of a sequence to the next, left as seen from above."""
+
+AnyRoom = TypeVar("AnyRoom", bound="Room | ImportedRoom")
+
+
+class Lights(Protocol):
+    """Where the light of frames comes from."""
+
+    def one(self, rng: np.random.Generator, cameras: Sequence[Camera]) -> Lighting:
+        """A lighting that the frames of these cameras share."""
+
+    def moving(self, rng: np.random.Generator, cameras: Sequence[Camera]) -> tuple[Lighting, ...]:
+        """One a camera, each a small step from the one before."""
+
+
+@dataclass(frozen=True)
+class Environments:
+    """One of several panoramas, turned at random."""
+
+    panoramas: Sequence[Panorama]
+
+    def one(self, rng: np.random.Generator, cameras: Sequence[Camera]) -> Lighting:
+        """See `Lights`."""
+        return self.moving(rng, cameras[:1])[0]
+
+    def moving(self, rng: np.random.Generator, cameras: Sequence[Camera]) -> tuple[Lighting, ...]:
+        """See `Lights`. The environment turns."""
+        panorama = self.panoramas[int(rng.integers(len(self.panoramas)))]
+        start = float(rng.uniform(0, 2 * math.pi))
+        return tuple(
+            Lighting(environment=EnvironmentMap(panorama, (start + TURN * step) % (2 * math.pi)))
+            for step in range(len(cameras))
+        )
+
+
+def lit(room: AnyRoom, lights: Lights, moves: Mapping[str, str]) -> AnyRoom:
+    """The room with a lighting for every camera.
+
+    A still has one of its own; the frames of a path share one, or it moves. moves: "camera", "light" or "both", by the
+    name of the path. The light of a still depends on the seed and its number alone, that of a path on its place among
+    the paths.
+    """
+    lightings: list[Lighting] = []
+    paths = 0
+    for path, group in groupby(room.cameras, key=lambda camera: camera.path):
+        cameras = tuple(group)
+        if not path:
+            for camera in cameras:
+                lightings.append(lights.one(_rng(room, 0, len(lightings)), [camera]))
+            continue
+        rng = _rng(room, 1, paths)
+        paths += 1
+        if moves[path] == "camera":
+            lightings += [lights.one(rng, cameras)] * len(cameras)
+        else:
+            lightings += lights.moving(rng, cameras)
+    return replace(room, lightings=tuple(lightings))
+
+
+def _rng(room: Room | ImportedRoom, *number: int) -> np.random.Generator:
+    return np.random.default_rng(np.random.SeedSequence(room.seed, spawn_key=(room.index, LANE, *number)))
+
+
+def shot_of(room: Room | ImportedRoom, view: int) -> Shot:
+    """What a frame of a room is made from."""
+    camera = room.cameras[view]
+    lighting = room.lightings[view] if room.lightings else Lighting()
+    return Shot(PinholeCamera(camera.position, camera.target, camera.fov), lighting)
+
+
+def shot_before(room: Room | ImportedRoom, view: int) -> Shot | None:
+    """That of the frame before it on its path; None for the first one and for stills."""
+    camera = room.cameras[view]
+    before = room.cameras[view - 1] if view > 0 and camera.path else None
+    follows = before is not None and (before.path, before.step) == (camera.path, camera.step - 1)
+    return shot_of(room, view - 1) if follows else None
