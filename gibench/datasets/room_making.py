@@ -114,9 +114,12 @@ def sampled_room(recipe: Recipe, room: int) -> Room | ImportedRoom:
 
     Raises `RejectedRoom`, `SceneFileError`.
     """
-    from gibench.generators.shots import Environments, lit
+    from gibench.generators.shots import AreaLights, Environments, light_space, lit
 
     built = _sampled(recipe, room)
+    if recipe.lighting == "area-light":
+        aspect = recipe.resolution[0] / recipe.resolution[1]
+        return lit(built, AreaLights(light_space(built), aspect), recipe.moves())
     if recipe.lighting == "environments":
         return lit(built, Environments(panoramas_of(recipe)), recipe.moves())
     return built

@@ -16,10 +16,12 @@ from gibench import gate
 from gibench.datasets.errors import DatasetError, StorageError
 from gibench.datasets.exr import decode, is_radiance, total_of_parts
 from gibench.datasets.exr_header import HeaderError, read_header
-from gibench.datasets.folder import MANIFEST, PREVIEW, TABLE, whole_rooms
+from gibench.datasets.folder import ENVIRONMENTS, MANIFEST, PREVIEW, TABLE, whole_rooms
+from gibench.datasets.lightings import kept_panorama
 from gibench.datasets.manifest import frame_table, read_manifest, recipe_of, room_record
 from gibench.datasets.recipes import Recipe
 from gibench.datasets.table import read_table
+from gibench.errors import GibenchError
 from gibench.rendering.channels import CHANNELS, PARTS
 
 #: Types in which a kind of channel may be stored.
@@ -67,6 +69,7 @@ def verify(root: Path, on_room: Callable[[int, int], None] = lambda done, of: No
         except DatasetError as problem:
             problems.append(Problem(f"rooms/{room:06d}/frames.json", str(problem)))
     on_room(len(expected), len(expected))
+    problems.extend(_panorama_problems(root, records))
     problems.extend(_table_problems(root, records, recipe))
     if not (root / PREVIEW).is_file():
         problems.append(Problem(PREVIEW, "the contact sheet is missing: `gibench dataset preview` makes it"))
@@ -108,6 +111,17 @@ def _room_problems(root: Path, record: Mapping[str, Any], recipe: Recipe, room: 
             continue  # said above
         except (HeaderError, StorageError) as fault:
             yield Problem(place, str(fault))
+
+
+def _panorama_problems(root: Path, records: list[dict[str, Any]]) -> Iterator[Problem]:
+    lightings = [frame["lighting"] for record in records for frame in record["frames"] if frame.get("lighting")]
+    for sha256, name in {
+        light["sha256"]: light["environment"] for light in lightings if "sha256" in light
+    }.items():
+        try:
+            _ = kept_panorama(root, name, sha256).pixels
+        except GibenchError as problem:
+            yield Problem(f"{ENVIRONMENTS}/{sha256}.exr", str(problem))
 
 
 def _file_problem(root: Path, file: str, known: Mapping[str, Any]) -> str:

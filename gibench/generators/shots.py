@@ -17,6 +17,7 @@ from gibench.rendering.panoramas import Panorama
 
 if TYPE_CHECKING:
     from gibench.generators.imported.room import ImportedRoom
+    from gibench.generators.light_space import LightSpace
 
 LANE = 1001
 """Of the random numbers of lights, far above those that rooms draw from."""
@@ -55,6 +56,37 @@ class Environments:
             Lighting(environment=EnvironmentMap(panorama, (start + TURN * step) % (2 * math.pi)))
             for step in range(len(cameras))
         )
+
+
+@dataclass(frozen=True)
+class AreaLights:
+    """Rectangles in free space. space: that of the room. aspect: of the images, width over height."""
+
+    space: LightSpace
+    aspect: float
+
+    def one(self, rng: np.random.Generator, cameras: Sequence[Camera]) -> Lighting:
+        """See `Lights`. Raises RejectedRoom where there is no place."""
+        from gibench.generators.area_lights import sample_area_light
+
+        return Lighting(sample_area_light(rng, self.space, cameras=cameras, aspect=self.aspect))
+
+    def moving(self, rng: np.random.Generator, cameras: Sequence[Camera]) -> tuple[Lighting, ...]:
+        """See `Lights`. Raises RejectedRoom where there is no way."""
+        from gibench.generators.area_lights import sample_area_light_path
+
+        lights = sample_area_light_path(rng, self.space, len(cameras), cameras=cameras, aspect=self.aspect)
+        return tuple(Lighting(light) for light in lights)
+
+
+def light_space(room: Room | ImportedRoom) -> LightSpace:
+    """Where area lights of a room may be. Raises NoFreeSpace, BackendError."""
+    from gibench.rendering.backend import select_variant
+
+    select_variant()  # before anything loads Mitsuba, so that it finds the right LLVM
+    from gibench.generators.light_space import LightSpace, room_light_space
+
+    return room_light_space(room) if isinstance(room, Room) else LightSpace(room.scene.loaded, room.free)
 
 
 def lit(room: AnyRoom, lights: Lights, moves: Mapping[str, str]) -> AnyRoom:

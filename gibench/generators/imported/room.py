@@ -37,7 +37,8 @@ class ImportedRoom:
     """A scene with its cameras: its own first, then stills, then those on a path.
 
     index: number in its dataset. openings: (N, 3, 3) rectangles that daylight enters by, as far as they were found.
-    rejections: reason → count, of views. lightings: one a camera, or none where all frames have the scene's own light.
+    rejections: reason → count, of views. free: (N, 3) points all over its free space, m, as far as it was found.
+    lightings: one a camera, or none where all frames have the scene's own light.
     """
 
     seed: int
@@ -46,6 +47,7 @@ class ImportedRoom:
     cameras: tuple[Camera, ...]
     openings: FloatArray = field(default_factory=lambda: np.zeros((0, 3, 3)))
     rejections: Mapping[str, int] = field(default_factory=dict)
+    free: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
     lightings: tuple[Lighting, ...] = ()
 
     @property
@@ -123,7 +125,7 @@ def import_room(
         raise SceneFileError(
             f"{scene.tree.file}: the scene has no camera of its own: ask for some with --views"
         )
-    return ImportedRoom(seed, index, scene, tuple(cameras), openings, dict(rejections))
+    return ImportedRoom(seed, index, scene, tuple(cameras), openings, dict(rejections), found)
 
 
 def _near_planes_told(scene: ImportedScene, resolution: tuple[int, int]) -> ImportedScene:
