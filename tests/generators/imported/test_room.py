@@ -10,17 +10,13 @@ import numpy as np
 import pytest
 import trimesh
 
-from gibench.generators.daylight import hdr
 from gibench.generators.imported.errors import SceneFileError
 from gibench.generators.imported.openings import find_openings
 from gibench.generators.imported.orientation import oriented, pieces
-from gibench.generators.imported.relighting import lit_by_area_light, lit_by_environment
 from gibench.generators.imported.room import import_room, write_imported_room
 from gibench.generators.imported.scene import ImportSettings, fingerprint, import_scene
 from gibench.generators.imported.survey import survey
 from gibench.generators.imported.turning import with_meshes_turned, without_flips
-from gibench.generators.light import radiance_of
-from gibench.generators.parts import Environment, Light
 from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.free_space import free_space
 from gibench.rendering.render import render_frame
@@ -426,62 +422,6 @@ def test_lamps_mirrors_and_panes_stay_exact(tmp_path):
     )
     scene = import_scene(written(tmp_path, body))
     assert [shape.type for shape in scene.tree.root.nodes("shape")] == ["rectangle", "sphere", "disk"]
-
-
-LAMP = Light("bulb", "disk", (0.3,), (0.0, 0.0, 2.5), (0.0, 0.0, -1.0), 2000.0, 3000.0)
-
-
-def test_one_area_light_in_place_of_all(tmp_path):
-    scene = import_scene(room_file(tmp_path))
-    lit = lit_by_area_light(scene, LAMP)
-    assert one(lit.tree.root, "emitter").type == "area"
-    assert len(scene.loaded.mi_scene.emitters()) == len(lit.loaded.mi_scene.emitters()) == 1
-    camera = PinholeCamera((0, 0, 1), (0, 1e-3, 2.5), 0.1)
-    seen = render_frame(lit.loaded, camera, resolution=(8, 8), channels=("emission",), spp=16).arrays
-    np.testing.assert_allclose(seen["emission"][4, 4], radiance_of(LAMP), rtol=1e-5)
-    twice = lit_by_area_light(lit, Light("other", *list(vars(LAMP).values())[1:]))
-    assert len(twice.loaded.mi_scene.emitters()) == 1
-    assert "lamp" in {shape.get("id") for shape in scene.tree.root.nodes("shape")}
-
-
-def test_an_environment_in_place_of_all(tmp_path):
-    panorama = np.zeros((16, 32, 3), np.float32)
-    panorama[:8] = (3.0, 2.0, 1.0)
-    from gibench.rendering.backend import select_variant
-
-    select_variant()
-    import mitsuba as mi
-
-    mi.Bitmap(panorama).write(str(tmp_path / "sky.hdr"))
-    ground = '<shape type="rectangle"><transform name="to_world"><scale value="50"/></transform></shape>'
-    lamp = '<emitter type="point"/>'
-    scene = import_scene(written(tmp_path, ground + lamp), ImportSettings(up="z"))
-    environment = hdr(path=str(tmp_path / "sky.hdr"), rotation=0.0, lux=1000.0)
-    lit = lit_by_environment(scene, environment)
-    assert one(lit.tree.root, "emitter").type == "envmap"
-    camera = PinholeCamera((0, 0, 2), (0, 1e-3, 0), 0.5)
-    frame = render_frame(lit.loaded, camera, resolution=(8, 8), channels=("color",), spp=256).arrays["color"]
-    # A white ground of albedo one half under a uniform upper hemisphere L sends out L / 2; 1000 lx are L · π · 683.
-    luminance = frame.mean((0, 1)) @ [0.2126, 0.7152, 0.0722]
-    assert luminance == pytest.approx(0.5 * 1000 / 683 / np.pi, rel=0.03)
-    write_imported_room(
-        import_room(with_camera(lit), resolution=SIZE, views=0),
-        tmp_path / "out",
-        max_depth=2,
-        resolution=SIZE,
-        spp=1,
-    )
-    assert (tmp_path / "out/textures/environment0.hdr").is_file()
-    dark = lit_by_environment(lit, Environment())
-    assert not [node for node in dark.tree.root.everything() if node.tag == "emitter"]
-
-
-def with_camera(scene):
-    from dataclasses import replace
-
-    from gibench.generators.imported.own_cameras import GivenCamera
-
-    return replace(scene, cameras=(GivenCamera((0, 0, 2), (0, 1, 0), 0.8, "x"),))
 
 
 def test_a_scene_counts_by_all_of_its_files(tmp_path):
