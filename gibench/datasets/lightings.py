@@ -5,14 +5,20 @@ from __future__ import annotations
 import re
 import tempfile
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from gibench import gate
+from gibench.datasets.checked import shown
 from gibench.datasets.errors import DatasetError
+from gibench.datasets.exr import decode
 from gibench.datasets.files import write_whole
 from gibench.datasets.folder import ENVIRONMENTS
 from gibench.rendering.lighting import AreaLight, EnvironmentMap, Lighting
-from gibench.rendering.panoramas import Panorama
+from gibench.rendering.panoramas import Panorama, Pixels
 
 _AXES = ("x", "y", "z")
 _PLACES = {"centre": "light", "direction": "light_direction", "up": "light_up"}
@@ -73,18 +79,18 @@ def _vector(row: Mapping[str, Any], column: str) -> tuple[float, float, float]:
     return x, y, z
 
 
-def panorama_file(root: Path, sha256: str) -> Path:
-    """Where a dataset keeps the panorama of that hash. Raises `DatasetError` for what is none."""
+def _file(sha256: str) -> str:
+    """The file of a panorama, from the folder of its dataset. Raises `DatasetError` for what is no hash."""
     if not re.fullmatch("[0-9a-f]{64}", sha256):
-        raise DatasetError(f"{root}: an environment is called {sha256[:80]!r}, which is no SHA-256")
-    return root / ENVIRONMENTS / f"{sha256}.exr"
+        raise DatasetError(f"an environment is called {shown(sha256)}, which is no SHA-256")
+    return f"{ENVIRONMENTS}/{sha256}.exr"
 
 
 def keep_panorama(root: Path, panorama: Panorama) -> None:
     """Write a panorama into a dataset unless it is there: OpenEXR, float32, bit for bit what lights the frames."""
     import OpenEXR
 
-    path = panorama_file(root, panorama.sha256)
+    path = root / _file(panorama.sha256)
     if path.is_file():
         return
     path.parent.mkdir(exist_ok=True)
@@ -97,5 +103,10 @@ def keep_panorama(root: Path, panorama: Panorama) -> None:
 
 
 def kept_panorama(root: Path, name: str, sha256: str) -> Panorama:
-    """A panorama of a dataset; its file is read when its pixels are asked for."""
-    return Panorama(name, sha256, panorama_file(root, sha256))
+    """A panorama of a dataset, read when its pixels are asked for. Raises `DatasetError`, then also `StorageError`."""
+    return Panorama(name, sha256, partial(_read, root, _file(sha256)))
+
+
+def _read(root: Path, file: str) -> Pixels:
+    pixels = decode(gate.inside(root, file), ["color"])["color"]
+    return np.ascontiguousarray(pixels, dtype=np.float32)

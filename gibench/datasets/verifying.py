@@ -114,7 +114,9 @@ def _room_problems(root: Path, record: Mapping[str, Any], recipe: Recipe, room: 
 
 
 def _panorama_problems(root: Path, records: list[dict[str, Any]]) -> Iterator[Problem]:
-    lightings = [frame["lighting"] for record in records for frame in record["frames"] if frame.get("lighting")]
+    lightings = [
+        frame["lighting"] for record in records for frame in record["frames"] if frame.get("lighting")
+    ]
     for sha256, name in {
         light["sha256"]: light["environment"] for light in lightings if "sha256" in light
     }.items():

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -28,12 +28,12 @@ class Panorama:
     """Radiance from all directions, laid out as `latlong` says.
 
     name: by which it is told apart in tables. sha256: of its size and pixels; two panoramas are equal where both are.
-    source: the pixels, or an OpenEXR file of them, which is read when they are asked for. Make one with `of`.
+    source: the pixels, or what reads them when they are asked for. Make one with `of`.
     """
 
     name: str
     sha256: str
-    source: Path | Pixels = field(compare=False, repr=False)
+    source: Pixels | Callable[[], Pixels] = field(compare=False, repr=False)
 
     @classmethod
     def of(cls, name: str, pixels: NDArray[Any]) -> Panorama:
@@ -44,21 +44,12 @@ class Panorama:
 
     @cached_property
     def pixels(self) -> Pixels:
-        """(H, 2·H, 3), read-only. Raises PanoramaError where the file does not hold the pixels of `sha256`."""
-        if not isinstance(self.source, Path):
+        """(H, 2·H, 3), read-only. Raises PanoramaError where what was read is not what `sha256` says."""
+        if not callable(self.source):
             return self.source
-        try:
-            # Mitsuba's reader of OpenEXR never returns in a process that may use one thread only.
-            import OpenEXR
-
-            with OpenEXR.File(str(self.source)) as file:
-                pixels = np.ascontiguousarray(file.channels()["RGB"].pixels, dtype=np.float32)
-        except Exception as error:  # what OpenEXR raises for a file that is no image differs by its fault
-            raise PanoramaError(
-                f"panorama {self.source}: not readable ({str(error).splitlines()[0]})"
-            ) from None
+        pixels = self.source()
         if digest(pixels) != self.sha256:
-            raise PanoramaError(f"panorama {self.source}: its pixels are not those that it was made with")
+            raise PanoramaError(f"panorama {self.name}: its pixels are not those that it was made with")
         pixels.setflags(write=False)
         return pixels
 

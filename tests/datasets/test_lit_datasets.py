@@ -159,7 +159,7 @@ def test_verify_finds_a_map_that_was_lost_or_changed(lit, tmp_path):
     problems = verify(root)
     assert [problem.file for problem in problems] == [f"environments/{one.name}"]
     one.unlink()
-    assert "not readable" in verify(root)[0].what
+    assert "cannot be read" in verify(root)[0].what
 
 
 @pytest.mark.parametrize(
