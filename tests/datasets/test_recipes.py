@@ -124,7 +124,9 @@ def test_a_path_beside_stills():
         RecipeError, match="recipe: path_views needs a path: set path to walk, orbit or eight"
     ):
         check_recipe({"path_views": 2})
-    with pytest.raises(RecipeError, match='rendered is "path", but only rooms with path_views or held_out'):
+    with pytest.raises(
+        RecipeError, match='rendered is "path", but only rooms with path_views, sequences or held_out'
+    ):
         check_recipe({"path": "walk", "rendered": "path"})
 
 
