@@ -68,7 +68,11 @@ def render_frame(scene: Any, camera: Any, **settings: Any) -> SimpleNamespace:
 def sample_room(seed: int, index: int, *, kinds: tuple[str, ...], views: int, **_: Any) -> SimpleNamespace:
     camera = SimpleNamespace(position=(0.0, 0.0, 1.5), target=(1.0, 0.0, 1.5), fov=1.2, path="", step=0)
     return SimpleNamespace(
-        index=index, kind=kinds[0], cameras=(camera,) * views, rejections={"view: too dark": 1}
+        index=index,
+        kind=kinds[0],
+        cameras=(camera,) * views,
+        lightings=(),
+        rejections={"view: too dark": 1},
     )
 
 
@@ -98,7 +102,7 @@ class Setup:
         scene = SimpleNamespace(materials=("oak",), shapes=("floor.0",))
         modules = {
             "gibench.generators.rooms": {"sample_room": sampled, "RejectedRoom": RejectedRoom},
-            "gibench.generators.scene_files": {"write_room": write_room},
+            "gibench.generators.scene_files": {"write_room": write_room, "lighting_record": None},
             "gibench.rendering.scene": {"load_scene": lambda path, share_kernels: scene},
             "gibench.rendering.render": {"render_frame": rendered},
         }
