@@ -21,6 +21,7 @@ from typing import Any
 
 from gibench.baselines.sources import digest, module_of
 from gibench.baselines.stages import synchronise
+from gibench.baselines.training_set import TrainingSet
 from gibench.datasets.files import as_json, sync_tree
 from gibench.datasets.folder import own_leftovers
 
@@ -50,9 +51,16 @@ class BakeCache:
     depend on: variant, versions, hardware.
     """
 
-    def __init__(self, root: Path, scene: str, machine: Mapping[str, Any]) -> None:
-        """root: made when something is baked. What killed processes left there goes."""
+    def __init__(
+        self, root: Path, scene: str, machine: Mapping[str, Any], views: TrainingSet | None = None
+    ) -> None:
+        """root: made when something is baked. What killed processes left there goes.
+
+        views: what a making may learn from. Those that it is handed are kept with the bake, and charged to whoever
+        finds it.
+        """
         self.root, self._scene, self._machine = root, scene, dict(machine)
+        self._views = TrainingSet() if views is None else views
         self.used: list[Bake] = []
         remove_abandoned(root)
 
@@ -81,9 +89,10 @@ class BakeCache:
         name = hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()[:24]
         folder = self.root / f"{kind}-{name}"
         if not (folder / RECORD).is_file():
-            _make(folder, key, make)
+            _make(folder, key, make, self._views)
         record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
         bake = Bake(kind, folder, record["seconds"], record["bytes"])
+        self._views.book(record["views"])
         if bake.folder not in [used.folder for used in self.used]:
             self.used.append(bake)
         return bake
@@ -97,15 +106,20 @@ class BakeCache:
         return folder.with_name(f"{folder.name.partition(PARTIAL)[0]}.checkpoint")
 
 
-def _make(folder: Path, key: dict[str, Any], make: Callable[[Path], float | None]) -> None:
+def _make(
+    folder: Path, key: dict[str, Any], make: Callable[[Path], float | None], views: TrainingSet
+) -> None:
     with _held(folder.with_name(f".{folder.name}{PARTIAL}{os.getpid()}")) as partial:
         synchronise()
         start = time.perf_counter()
-        before = make(partial) or 0.0
+        with views.apart() as handed_out:
+            before = make(partial) or 0.0
         synchronise()
         seconds = before + time.perf_counter() - start
         size = sum(path.stat().st_size for path in partial.rglob("*") if path.is_file())
-        (partial / RECORD).write_bytes(as_json({"key": key, "seconds": seconds, "bytes": size}))
+        (partial / RECORD).write_bytes(
+            as_json({"key": key, "seconds": seconds, "bytes": size, "views": handed_out})
+        )
         sync_tree(partial)
         if folder.exists() and not (folder / RECORD).is_file():
             shutil.rmtree(folder)

@@ -23,11 +23,17 @@ from gibench.errors import GibenchError
 if TYPE_CHECKING:
     from gibench.baselines.bakes import BakeCache
     from gibench.baselines.stages import Stages
+    from gibench.baselines.training_set import TrainingSet
     from gibench.datasets.loading import Frame
     from gibench.rendering.camera import PinholeCamera
+    from gibench.rendering.light_rig import LightRig
+    from gibench.rendering.lighting import Shot
     from gibench.rendering.scene import Scene
 
 Setting = int | float | str | bool
+
+MAX_DEPTH = 8
+"""Scattering events of a path where no recipe says: that of recipes."""
 
 
 class MethodError(GibenchError):
@@ -39,7 +45,7 @@ class Knob:
     """One setting of a method, and what it may be.
 
     values: allowed settings, cheapest first. bakes: a change needs another preparation; otherwise one preparation
-    serves all settings.
+    serves all settings. trains: a change needs another training, and so another preparation.
     """
 
     name: str
@@ -47,6 +53,7 @@ class Knob:
     values: tuple[Setting, ...]
     meaning: str
     bakes: bool = False
+    trains: bool = False
 
     def __post_init__(self) -> None:
         """Raises MethodError for a default that is not allowed."""
@@ -73,7 +80,8 @@ class Method:
     is ("probes", "ray tracing" …). paper: where it is from. implementation: "package.module:Class", an
     `Implementation`, imported only to run it. channels: of the training views that it reads. knobs: its settings.
     budget: the knob that equal-time comparisons turn. trained: draws random numbers while it is prepared, so that
-    several seeds say more than one. variants: the ablations that its paper shows, methods of their own on a board.
+    several seeds say more than one. trains: has the stage `train`. variants: the ablations that its paper shows,
+    methods of their own on a board.
     """
 
     id: str
@@ -86,6 +94,7 @@ class Method:
     knobs: tuple[Knob, ...] = ()
     budget: str | None = None
     trained: bool = False
+    trains: bool = False
     variants: tuple[Variant, ...] = ()
 
     def with_variants(self) -> tuple[Method, ...]:
@@ -123,7 +132,11 @@ class Method:
 
     def baked_settings(self, settings: Mapping[str, Setting]) -> dict[str, Setting]:
         """Those of the settings that decide what is prepared."""
-        return {knob.name: settings[knob.name] for knob in self.knobs if knob.bakes}
+        return {knob.name: settings[knob.name] for knob in self.knobs if knob.bakes or knob.trains}
+
+    def trained_settings(self, settings: Mapping[str, Setting]) -> dict[str, Setting]:
+        """Those of the settings that decide what is trained."""
+        return {knob.name: settings[knob.name] for knob in self.knobs if knob.trains}
 
     def load(self) -> type[Implementation]:
         """Import the implementation. Raises MethodError where it is not there."""
@@ -138,14 +151,34 @@ class Method:
 
 
 @dataclass(frozen=True)
+class Training:
+    """What a method may train on: once a track on many rooms, or once a scene on that scene's views.
+
+    views: frames to learn from, of one room or of many. seconds: after which a training ends by itself, with the best
+    weights so far; None for no end but its own. seed: all that it may draw random numbers from. folder: where weights
+    go; what lies there afterwards is what `Site.weights` shows to whoever uses them. checkpoint: a file for what a
+    training must not lose when it is cut off; it goes once the weights are there. stages: where it is timed.
+    """
+
+    views: TrainingSet
+    seconds: float | None
+    seed: int
+    folder: Path
+    checkpoint: Path
+    stages: Stages
+
+
+@dataclass(frozen=True)
 class Site:
     """What a method may prepare from.
 
-    scene: loaded under the run's variant. folder: that of the room, with scene.xml and room.json. resolution: (width,
-    height) of the frames to come. training: views of the room that are not scored; whoever is handed
-    one is charged with its rendering.
-    seed: all that the method may draw random numbers from. bakes: files that are shared with other methods.
-    stages: where preparation is timed.
+    scene: loaded under the run's variant. folder: with scene.xml and what it needs, but without any frame. resolution:
+    (width, height) of the frames to come. training: views of the room that are not scored; whoever is handed one is
+    charged with its rendering. seed: all that the method may draw random numbers from. bakes: files that are shared
+    with other methods. stages: where preparation is timed. max_depth: scattering events of the paths that make the
+    light. weights: the folder that `train` filled, None for methods that have no such stage. seconds: after which a
+    training within `prepare` ends by itself, None for no end but its own. parts: of the image that are scored. rig:
+    lights the scene, None where its light stays; it is set before each frame, and left at the scene's own light here.
     """
 
     scene: Scene
@@ -155,21 +188,32 @@ class Site:
     seed: int
     bakes: BakeCache
     stages: Stages
+    max_depth: int = MAX_DEPTH
+    weights: Path | None = None
+    seconds: float | None = None
+    parts: tuple[str, ...] = ("full", "specular")
+    rig: LightRig | None = None
 
 
 @dataclass(frozen=True)
 class View:
-    """A frame to be rendered: a camera of a path.
+    """A frame to be rendered: a still, or a frame of a sequence.
 
-    previous: the camera of the frame before it; None at the start of the path, when a method must forget what it
-    kept. seed: for what is drawn at random in this frame.
+    shot: its camera and its lighting, which the scene has already. previous: the shot of the frame before it; None for
+    stills and at the start of a sequence, when a method must forget what it kept. seed: for what is drawn at random in
+    this frame.
     """
 
-    camera: PinholeCamera
-    previous: PinholeCamera | None
+    shot: Shot
+    previous: Shot | None
     resolution: tuple[int, int]
     index: int
     seed: int
+
+    @property
+    def camera(self) -> PinholeCamera:
+        """The camera of the shot."""
+        return self.shot.camera
 
 
 class Prediction:
@@ -231,9 +275,10 @@ def evaluate(arrays: Any) -> None:
 
 
 class Implementation(Protocol):
-    """The two stages. One object serves one scene, one preparation and one seed.
+    """The stages. One object serves one training, or one scene, one preparation and one seed.
 
-    A constructor takes the settings (`Method.settings`).
+    A constructor takes the settings (`Method.settings`). A method whose card says `trains` has `train` too, see
+    `Trainable`.
     """
 
     def __init__(self, settings: Mapping[str, Setting]) -> None:
@@ -244,6 +289,16 @@ class Implementation(Protocol):
 
     def render(self, view: View, stages: Stages) -> Prediction:
         """Render one frame. The harness reads the clock around it; stages tells its parts apart."""
+
+
+class Trainable(Protocol):
+    """An implementation that trains, once for all rooms where the track has rooms to train on."""
+
+    def train(self, training: Training) -> float | None:
+        """Learn, and put into `training.folder` what `prepare` will need. The object is not used afterwards.
+
+        May return seconds that were spent before, in a run that was cut off.
+        """
 
 
 class Adjustable(Protocol):

@@ -11,8 +11,9 @@ from collections.abc import Callable
 from typing import Any
 
 from gibench.baselines.method import Method, Setting
+from gibench.benchmarks.outcomes import Job
 from gibench.benchmarks.registry import Found
-from gibench.benchmarks.running import Job, Run
+from gibench.benchmarks.running import Run
 from gibench.benchmarks.settings import Choice, label
 
 

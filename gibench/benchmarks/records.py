@@ -107,6 +107,15 @@ class FrameTime(Checked):
 
     seconds: Amount
     stages: Annotated[dict[str, Amount], Field(max_length=100)]
+    lighting_seconds: Amount = 0.0
+
+
+class Look(Checked):
+    """A look at the held-out error of a training."""
+
+    step: Count
+    seconds: Amount
+    error: float | None
 
 
 class Bake(Checked):
@@ -129,6 +138,7 @@ class Prepare(Checked):
     probes: Amount = 0.0
     references: Amount = 0.0
     training: Amount = 0.0
+    curves: list[list[Look]] = Field(default_factory=list)
 
 
 class Result(Checked):
@@ -142,6 +152,7 @@ class Result(Checked):
     family: Text
     label: Text
     room: Count
+    tags: list[list[str]] = Field(default_factory=list)
     kind: str
     created: str
     machine: Machine
@@ -172,6 +183,6 @@ class Scores(Checked):
 
     format: int
     frames: dict[Part, dict[Metric, list[float | None]]]
-    sequences: dict[Part, dict[MetricOrSide, float | None]]
+    sequences: dict[Part, dict[str, dict[MetricOrSide, float | None]]]
     skipped: dict[str, str]
-    exposure: Annotated[float, Field(gt=0)] = 1.0
+    exposures: list[Annotated[float, Field(gt=0)]] = Field(default_factory=list)

@@ -3,7 +3,8 @@
 RESULTS/run.json                    track, preset, scenes, machines, and what every command did
 RESULTS/scenes/reference/           the dataset of the frames on the paths; scenes/reference-again: the same frames with
                                     independent samples; scenes/training: that of the views
-RESULTS/bakes/room-000000/          what methods prepared
+RESULTS/scenes/sites/room-000000/   the files of a room that methods may see: without any frame
+RESULTS/bakes/room-000000/          what methods prepared; bakes/rooms: what they trained on rooms
 RESULTS/results/<id>.json           a result, never changed once it is written
 RESULTS/results/<id>/0000.exr       what it predicted
 RESULTS/set-aside/<id>-<n>.json     failed results that were tried again
@@ -75,8 +76,12 @@ class RunFolder:
         return self.dataset("reference"), self.dataset("reference-again")
 
     def bakes(self, scene: str) -> Path:
-        """Of a scene, shared by all methods."""
+        """Of a scene, shared by all methods; of "rooms" what is trained on rooms."""
         return self.root / "bakes" / scene
+
+    def site(self, scene: str) -> Path:
+        """Files of a scene that methods may see."""
+        return self.root / "scenes" / "sites" / scene
 
     def result_file(self, id: str) -> Path:
         """What is known of a result."""

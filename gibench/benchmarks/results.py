@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from gibench.benchmarks import machine as machines
 from gibench.benchmarks import predictions
+from gibench.benchmarks.costs import BOOKED
 from gibench.benchmarks.errors import ResultsError
 from gibench.benchmarks.result_files import RunFolder
 from gibench.benchmarks.scenes import SceneFiles, scenes_in
-from gibench.benchmarks.scoring import exposure_of, read_scores, reference_parts
-from gibench.benchmarks.worker import BOOKED
+from gibench.benchmarks.scoring import exposures_of, read_scores, reference_parts
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -50,7 +50,7 @@ COLUMNS = {
 #: The stage of a frame's time that no stage of the method names.
 OTHER = "other"
 
-#: Number of the frame in `Results.floor` where a metric is of the whole path.
+#: Number of the frame in `Results.floor` where a metric is of a whole sequence: the first of a scene.
 WHOLE_PATH = -1
 
 
@@ -142,7 +142,7 @@ class Results:
 
     @cached_property
     def sequences(self) -> pd.DataFrame:
-        """A row a temporal metric and part: result, metric, part, value.
+        """A row a sequence, temporal metric and part: result, sequence, metric, part, value.
 
         Beside each metric stand what it measured in the prediction and in the reference, as `<metric>_prediction` and
         `<metric>_reference`.
@@ -150,19 +150,21 @@ class Results:
         import pandas as pd
 
         rows = [
-            (id, metric, part, value)
+            (id, sequence, metric, part, value)
             for id, scores in self._scores.items()
-            for part, by_metric in scores["sequences"].items()
+            for part, by_sequence in scores["sequences"].items()
+            for sequence, by_metric in by_sequence.items()
             for metric, value in by_metric.items()
         ]
-        columns = {"result": "str", "metric": "str", "part": "str"}
+        columns = {"result": "str", "sequence": "str", "metric": "str", "part": "str"}
         return pd.DataFrame(rows, columns=[*columns, "value"]).astype(columns | {"value": "float64"})
 
     @cached_property
     def floor(self) -> pd.DataFrame:
         """What the reference's own noise costs: scene, frame, metric, part, value.
 
-        Temporal metrics stand under frame −1 (`WHOLE_PATH`).
+        Temporal metrics stand under frame −1 (`WHOLE_PATH`) for the first sequence of a scene, −2 for the second, and
+        so on.
         """
         import pandas as pd
 
@@ -172,8 +174,12 @@ class Results:
             for part, by_metric in (scores or {}).get("frames", {}).items():
                 for metric, values in by_metric.items():
                     rows += [(scene, number, metric, part, value) for number, value in enumerate(values)]
-            for part, by_metric in (scores or {}).get("sequences", {}).items():
-                rows += [(scene, WHOLE_PATH, metric, part, value) for metric, value in by_metric.items()]
+            for part, by_sequence in (scores or {}).get("sequences", {}).items():
+                for number, by_metric in enumerate(by_sequence.values()):
+                    rows += [
+                        (scene, WHOLE_PATH - number, metric, part, value)
+                        for metric, value in by_metric.items()
+                    ]
         columns = {"scene": "str", "frame": "int64", "metric": "str", "part": "str"}
         return pd.DataFrame(rows, columns=[*columns, "value"]).astype(columns | {"value": "float64"})
 
@@ -194,9 +200,13 @@ class Results:
         """The reference of a frame of a scene's path, (H, W, 3) linear."""
         return reference_parts(self._scene(scene), frame)[part]
 
-    def exposure(self, scene: str) -> float:
-        """The exposure that the whole path of a scene is seen under."""
-        return exposure_of(self.folder, self._scene(scene))
+    def exposure(self, scene: str, frame: int) -> float:
+        """The exposure that a frame of a scene is seen under: that of its sequence, or its own."""
+        return self._exposures(scene)[frame]
+
+    @cache  # noqa: B019 - as long as the results
+    def _exposures(self, scene: str) -> tuple[float, ...]:
+        return exposures_of(self.folder, self._scene(scene))
 
     def record(self, result: str) -> Mapping[str, Any]:
         """All that is known of a result, as its JSON file says it: traceback and log of a failed one too."""

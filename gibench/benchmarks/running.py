@@ -3,124 +3,46 @@
 from __future__ import annotations
 
 import errno
-import multiprocessing
-import os
-import signal
 import time
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime
-from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
 import gibench
 from gibench.benchmarks import machine as machines
-from gibench.benchmarks import worker
+from gibench.benchmarks import outcomes, worker
 from gibench.benchmarks.code_version import code_version
-from gibench.benchmarks.errors import Interrupted, ResultsError, RunError, TrackError
+from gibench.benchmarks.errors import Interrupted, ResultsError, RunError
+from gibench.benchmarks.orders import Order
+from gibench.benchmarks.outcomes import Job
+from gibench.benchmarks.processes import Process
 from gibench.benchmarks.registry import Found
 from gibench.benchmarks.result_files import FORMAT, RunFolder, key_of
 from gibench.benchmarks.scenes import SceneFiles, scene_name, scenes_in
-from gibench.benchmarks.settings import Choice, base_settings, choices
-from gibench.benchmarks.track import Preset, Track
-from gibench.datasets.making import Progress, default_threads, make
-from gibench.rendering.channels import resolve
+from gibench.benchmarks.settings import Choice, base_settings
+from gibench.datasets.making import Progress, make
 
 #: Seconds that a process may take until renderer and scene are loaded.
 STARTUP_SECONDS = 600.0
-
-#: Seconds that a process which takes too long is given to say where it is.
-LAST_WORDS = 1.0
 
 #: What a run's time goes to; the rest of it is the harness.
 SPENT = ("scenes", "prepare", "render", "score")
 
 
-@dataclass(frozen=True)
-class Order:
-    """What a command asks for.
-
-    methods: with their settings, in the order in which they run. rooms, seeds: None takes the preset's. scenes: keys
-    of a recipe that put scene files in the place of rooms. command: how to do the same again, for the record and for
-    messages.
-    """
-
-    track: Track
-    preset: str
-    methods: tuple[tuple[Found, tuple[Choice, ...]], ...]
-    rooms: int | None = None
-    scenes: Mapping[str, Any] = field(default_factory=dict)
-    seeds: tuple[int, ...] | None = None
-    variant: str = "auto"
-    threads: int = field(default_factory=lambda: default_threads(1))
-    retry_failed: bool = False
-    command: str = ""
-
-    @property
-    def size(self) -> Preset:
-        """The preset itself."""
-        return self.track.preset(self.preset)
-
-    @property
-    def room_count(self) -> int:
-        """How many rooms or scenes."""
-        return len(self.scenes.get("scenes", ())) or self.rooms or self.size.rooms
-
-
-def ordered_methods(
-    track: Track, preset: str, methods: Sequence[Found], overrides: Mapping[str, Mapping[str, Any]]
-) -> tuple[tuple[Found, tuple[Choice, ...]], ...]:
-    """Methods with the settings that a preset and the user ask for.
-
-    Raises TrackError for a method that does not run on the track or lacks a channel of the training views,
-    MethodError for settings that do not exist.
-    """
-    size = track.preset(preset)
-    stored = size.recipe("training").channels
-    result = []
-    for found in methods:
-        method = found.method
-        if track.id not in method.tracks:
-            raise TrackError(
-                f"method '{method.id}' does not run on track {track.id}, but on {', '.join(method.tracks)}"
-            )
-        if missing := [channel for channel in resolve(method.channels) if channel not in stored]:
-            raise TrackError(
-                f"method '{method.id}' needs channel {', '.join(missing)} of the training views, which {track.id}, "
-                f"preset {preset}, does not store: copy the track (`gibench bench list --track {track.id} --show`), "
-                f"add it to channels under [presets.{preset}.training], and run with --track COPY.toml"
-            )
-        result.append((found, tuple(choices(method, size.plan(method), overrides.get(method.id, {})))))
-    return tuple(result)
-
-
-@dataclass(frozen=True)
-class Job:
-    """One result that is to be there."""
-
-    found: Found
-    choice: Choice
-    scene: SceneFiles
-    seed: int
-    config: dict[str, Any]
-    key: str
-
-    @property
-    def id(self) -> str:
-        """Sixteen hexadecimal digits."""
-        return self.key[:16]
-
-
 @dataclass
 class State:
-    """How far a run is, for whoever watches. record: of the result that has just been written."""
+    """How far a run is, for whoever watches.
+
+    record: of the result that has just been written. training: what a training on rooms that has just ended took.
+    """
 
     done: int = 0
     of: int = 0
     failed: int = 0
     record: dict[str, Any] | None = None
+    training: dict[str, Any] | None = None
     scenes: Progress | None = None
 
 
@@ -152,6 +74,7 @@ class Run:
         self.scenes: list[SceneFiles] = []
         self.facts: dict[str, Any] = {}
         self.machine = ""
+        self.trainings: dict[tuple[Any, ...], bool] = {}
         self.made: list[str] = []
         self.failed: list[str] = []
 
@@ -165,7 +88,7 @@ class Run:
         began = time.perf_counter()
         for which in ("reference", "reference-again"):
             self._make(which)
-        if any(found.method.channels for found, _ in order.methods):
+        if any(found.method.channels or found.method.trains for found, _ in order.methods):
             self._make("training")
         self.spent["scenes"] += time.perf_counter() - began
         self.scenes = [s for s in scenes_in(*self.folder.references) if s.room < order.room_count]
@@ -177,7 +100,7 @@ class Run:
             "track": self.order.track.id,
             "preset": self.order.preset,
             "warmup": size.warmup,
-            "training": size.recipe("training", scenes=scenes).identity(),
+            "training": {} if size.training is None else size.recipe("training", scenes=scenes).identity(),
             "reference": size.recipe("reference", scenes=scenes).identity(),
         }
 
@@ -230,7 +153,9 @@ class Run:
     def _make(self, which: Any) -> None:
         order = self.order
         rooms = order.room_count
-        if (manifest := self.folder.dataset(which) / "dataset.json").exists():
+        if which == "training" and order.size.training_rooms is not None:
+            rooms = order.size.training_rooms
+        elif (manifest := self.folder.dataset(which) / "dataset.json").exists():
             from gibench.datasets.manifest import read_manifest
 
             rooms = max(rooms, int(read_manifest(manifest.parent)["recipe"]["rooms"]))
@@ -250,7 +175,9 @@ class Run:
         """Every result that is to be there, scene by scene."""
         seeds = self.order.seeds or self.order.size.seeds
         versions = {found.method.id: code_version(found) for found, _ in methods}
-        training = key_of({"recipe": self._identity()["training"]})
+        size = self.order.size
+        own = {} if size.training_rooms is None else {"rooms": size.training_rooms}
+        training = key_of({"recipe": self._identity()["training"], **own})
         result = []
         for scene in self.scenes:
             for found, chosen in methods:
@@ -261,16 +188,18 @@ class Run:
                             "track": self.order.track.id,
                             "scene": scene.name,
                             "scene_sha256": scene.sha256,
-                            "frames": len(scene.cameras),
+                            "frames": len(scene),
                             "resolution": list(scene.resolution),
                             "warmup": self.order.size.warmup,
-                            "training": training if method.channels else None,
+                            "training": training if method.channels or method.trains else None,
                             "method": method.id,
                             "knobs": choice.settings,
                             "seed": seed,
                             "code": versions[method.id],
                             "machine": self.machine,
                         }
+                        if method.trained or method.trains:
+                            config["training_seconds"] = size.budget.training
                         result.append(Job(found, choice, scene, seed, config, key_of(config)))
         return result
 
@@ -286,8 +215,11 @@ class Run:
             baked = job.found.method.baked_settings(job.choice.settings)
             groups.setdefault((job.scene.name, job.found.method.id, job.seed, repr(baked)), []).append(job)
         for group in groups.values():
-            while group:
-                group = group[self._serve(group) :]
+            if self._is_trained(group[0], jobs):
+                while group:
+                    group = group[self._serve(group) :]
+            else:
+                self.state.done += len(group)
 
     def _is_there(self, job: Job) -> bool:
         if not self.folder.result_file(job.id).exists():
@@ -301,35 +233,85 @@ class Run:
         self.state.failed = len(self.failed)
         return True
 
-    def _serve(self, group: list[Job]) -> int:
-        """Start a process for some results of one preparation; returns how many are there now, at least one."""
-        first = group[0]
-        order = self.order
+    def _is_trained(self, job: Job, jobs: Sequence[Job]) -> bool:
+        """Train on rooms what a result needs; whether it is there now.
+
+        A training that failed is told once, by the first result that would have used it; the others are not tried.
+        """
+        method = job.found.method
+        if not (method.trains and self.order.track.prepare_on == "rooms"):
+            return True
+
+        def key_of_training(one: Job) -> tuple[Any, ...]:
+            knobs = one.found.method.trained_settings(one.choice.settings)
+            return one.found.method.id, one.seed, repr(knobs), str(one.config["code"])
+
+        key = key_of_training(job)
+        if key not in self.trainings:
+            alike = [one for one in jobs if key_of_training(one) == key]
+            self.trainings[key] = not any(self._failed_in_training(one) for one in alike) and self._train(job)
+        return self.trainings[key]
+
+    def _failed_in_training(self, job: Job) -> bool:
+        path = self.folder.result_file(job.id)
+        return path.exists() and self.folder.read_result(job.id).get("phase") == "train"
+
+    def _train(self, job: Job) -> bool:
+        """Start a process that trains on rooms; whether it came to an end."""
+        task = self._task([job], scene=None)
+        with Process(task) as process:
+            clock = time.perf_counter()
+            kind, content = process.heard(STARTUP_SECONDS)
+            if kind == "ready":
+                kind, content = process.heard(self.order.size.budget.prepare)
+            self.spent["prepare"] += time.perf_counter() - clock
+        if kind == "trained":
+            task.log.unlink(missing_ok=True)
+            self.state.training = {"method": job.found.method.id, "seed": job.seed, **content}
+            self.on_state(self.state)
+            self.state.training = None
+            return True
+        if kind == "storage":
+            raise OSError(errno.ENOSPC, "the disk is full", content)
+        self._keep(outcomes.bad(job, self.facts, "train", content, None, task.log))
+        return False
+
+    def _task(self, group: Sequence[Job], scene: SceneFiles | None) -> worker.Task:
+        first, order = group[0], self.order
         self.folder.logs.mkdir(exist_ok=True)
-        log = self.folder.logs / f"{first.id}.log"
-        task = worker.Task(
-            method=first.found.method,
+        method = first.found.method
+        on_rooms = order.track.prepare_on == "rooms"
+        return worker.Task(
+            method=method,
             seed=first.seed,
-            scene=first.scene,
+            scene=scene,
             settings=tuple((job.choice.settings, self.folder.partial(job.id)) for job in group),
-            training=self.folder.dataset("training") if first.found.method.channels else None,
+            training=self.folder.dataset("training") if method.channels or method.trains else None,
+            rooms=self.folder.bakes("rooms") if on_rooms else None,
+            site=self.folder.site(first.scene.name),
             bakes=self.folder.bakes(first.scene.name),
             machine={"machine": self.machine},
+            seconds=order.size.budget.training,
+            parts=order.track.parts,
             warmup=order.size.warmup,
             variant=self.facts["variant"],
             threads=order.threads,
-            log=log,
+            log=self.folder.logs / f"{first.id}.log",
         )
-        with _Process(task) as process:
+
+    def _serve(self, group: list[Job]) -> int:
+        """Start a process for some results of one preparation; returns how many are there now, at least one."""
+        task = self._task(group, group[0].scene)
+        limits = {
+            "start": STARTUP_SECONDS,
+            "prepare": self.order.size.budget.prepare,
+            "render": self.order.size.budget.render,
+        }
+        with Process(task) as process:
             served, prepared = 0, None
             phase, clock = "start", time.perf_counter()
             while True:
-                limit = {
-                    "start": STARTUP_SECONDS,
-                    "prepare": order.size.budget.prepare,
-                    "render": order.size.budget.render,
-                }[phase]
-                kind, content = process.heard(limit)
+                kind, content = process.heard(limits[phase])
                 spent = time.perf_counter() - clock
                 clock = time.perf_counter()
                 if kind == "ready":
@@ -341,10 +323,10 @@ class Run:
                     self.spent["render"] += content["warmup_seconds"] + sum(
                         f["seconds"] for f in content["frames"]
                     )
-                    self._keep(self._good(group[served], prepared or {}, content))
+                    self._keep(outcomes.good(group[served], self.facts, prepared or {}, content))
                     served += 1
                 elif kind == "done":
-                    log.unlink(missing_ok=True)
+                    task.log.unlink(missing_ok=True)
                     return served
                 elif kind == "storage":
                     raise OSError(errno.ENOSPC, "the disk is full", content)
@@ -354,56 +336,8 @@ class Run:
                     # A preparation that fails, fails for all settings that it was for.
                     lost = group[served : served + 1] if phase == "render" else group
                     for job in lost:
-                        self._keep(self._bad(job, phase, content, prepared, log))
+                        self._keep(outcomes.bad(job, self.facts, phase, content, prepared, task.log))
                     return served + len(lost)
-
-    def _base(self, job: Job) -> dict[str, Any]:
-        method = job.found.method
-        return {
-            "format": FORMAT,
-            "gibench": gibench.__version__,
-            "id": job.id,
-            "key": job.key,
-            "config": job.config,
-            "title": method.title,
-            "family": method.family,
-            "paper": method.paper,
-            "label": job.choice.label,
-            "room": job.scene.room,
-            "kind": job.scene.kind,
-            "created": datetime.now(UTC).isoformat(timespec="seconds"),
-            "machine": self.facts,
-        }
-
-    def _good(self, job: Job, prepared: dict[str, Any], rendered: dict[str, Any]) -> dict[str, Any]:
-        return {
-            **self._base(job),
-            "status": "ok",
-            "prepare": prepared,
-            "warmup_seconds": rendered["warmup_seconds"],
-            "frames": rendered["frames"],
-            "peak_mb": rendered["peak_mb"],
-            "gpu_mb": rendered["gpu_mb"],
-            "files": rendered["files"],
-        }
-
-    def _bad(
-        self, job: Job, phase: str, content: dict[str, str], prepared: dict[str, Any] | None, log: Path
-    ) -> dict[str, Any]:
-        where = {
-            "start": "before the preparation",
-            "prepare": "in the preparation",
-            "render": "while rendering",
-        }
-        return {
-            **self._base(job),
-            "status": "failed",
-            "phase": phase,
-            "reason": _printable(f"{where[phase]}: {content['reason']}"),
-            "traceback": _printable(content["traceback"]),
-            "log": _tail(log),
-            "prepare": prepared,
-        }
 
     def _keep(self, record: dict[str, Any]) -> None:
         self.folder.write_result(record)
@@ -477,56 +411,6 @@ def _why(root: Path, problem: OSError) -> str:
     if problem.errno in (errno.ENOSPC, errno.EDQUOT):
         return f"{root}: the disk is full: free some space, then run the same command again to continue"
     return f"{problem.filename or root}: {problem.strerror}"
-
-
-def _tail(log: Path, characters: int = 4000) -> str:
-    with suppress(OSError):
-        return log.read_text(encoding="utf-8", errors="replace")[-characters:]
-    return ""
-
-
-def _printable(text: str) -> str:
-    """Text that UTF-8 can hold, whatever an exception said."""
-    return text.encode("utf-8", "replace").decode()
-
-
-class _Process:
-    """A worker process, gone when the context is left."""
-
-    def __init__(self, task: worker.Task) -> None:
-        self.task = task
-
-    def __enter__(self) -> _Process:
-        context = multiprocessing.get_context("spawn")
-        ours, theirs = context.Pipe()
-        self.connection: Connection = ours
-        self.process = context.Process(target=worker.work, args=(theirs, self.task), daemon=True)
-        self.process.start()
-        theirs.close()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.process.kill()
-        self.process.join()
-        self.connection.close()
-
-    def heard(self, limit: float) -> tuple[str, Any]:
-        """The next message; ("lost", reason and traceback) where the process dies or takes over `limit` seconds."""
-        if not self.connection.poll(limit):
-            with suppress(OSError):
-                os.kill(self.process.pid or 0, signal.SIGUSR1)
-            time.sleep(LAST_WORDS)
-            reason = f"it took more than {limit:g} s, the track's limit"
-            return "lost", {"reason": reason, "traceback": _tail(self.task.log)}
-        try:
-            return tuple(self.connection.recv())
-        except (EOFError, OSError):
-            self.process.join()
-            code = self.process.exitcode or 0
-            how = f"killed by {signal.Signals(-code).name}" if code < 0 else f"ended with code {code}"
-            hint = " (out of memory?)" if code == -signal.SIGKILL else ""
-            reason = f"its process was {how}{hint}" if code < 0 else f"its process {how}"
-            return "lost", {"reason": reason, "traceback": _tail(self.task.log)}
 
 
 def failures(root: Path) -> list[tuple[str, str]]:

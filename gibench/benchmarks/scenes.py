@@ -1,4 +1,4 @@
-"""Scenes of a run: rooms with training views, and with the frames on a path that are held out.
+"""Scenes of a run: rooms with frames that are held out, stills and sequences, each with its reference.
 
 A reference is rendered twice with independent samples, and what is scored against is the mean of the two. Denoised
 references of this many samples are several times closer to the truth than what the samples alone give, but nothing in
@@ -9,24 +9,35 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Sequence
+import os
+import shutil
 from dataclasses import dataclass
+from functools import cache, cached_property
+from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any
 
 from gibench import gate
-from gibench.baselines.booking import Booking
 from gibench.benchmarks.errors import ResultsError
 from gibench.datasets.errors import DatasetError
 from gibench.datasets.exr import decode
-from gibench.datasets.loading import Dataset, Frame, open_dataset
+from gibench.datasets.loading import Frame, open_dataset
 from gibench.datasets.manifest import room_record
 
 if TYPE_CHECKING:
-    from torch import Tensor
-    from torch.utils.data import Dataset as TorchDataset
+    from gibench.rendering.lighting import Shot
 
-Vector = tuple[float, float, float]
+STILLS = "stills"
+"""Name of the frames that are in no sequence."""
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Frames of a sequence. name: of the sequence. first: number of its first frame. count: how many it has."""
+
+    name: str
+    first: int
+    count: int
 
 
 @dataclass(frozen=True)
@@ -34,8 +45,8 @@ class SceneFiles:
     """A scene on disk.
 
     name: such as "room-000000". folder: with scene.xml and room.json. sha256: of all that decides what is seen.
-    cameras: (position, target, horizontal field of view in radians) of the frames on the path, in order. halves: their
-    references, once and once more.
+    frames: those that are held out, stills first, then sequence by sequence. sequences: which of them follow each
+    other. halves: their references, once and once more. max_depth: scattering events of their paths.
     """
 
     name: str
@@ -44,12 +55,56 @@ class SceneFiles:
     folder: Path
     sha256: str
     resolution: tuple[int, int]
-    cameras: tuple[tuple[Vector, Vector, float], ...]
+    frames: tuple[Frame, ...]
+    sequences: tuple[Stretch, ...]
     halves: tuple[tuple[Path, ...], tuple[Path, ...]]
+    max_depth: int
+
+    def __len__(self) -> int:
+        """Number of frames that are held out."""
+        return len(self.frames)
+
+    @cached_property
+    def shots(self) -> tuple[Shot, ...]:
+        """Camera and lighting of each frame."""
+        return tuple(shot_of(frame) for frame in self.frames)
+
+    def before(self, frame: int) -> int | None:
+        """Number of the frame before it in its sequence; None for stills and where a sequence begins."""
+        stretch = self.stretch(frame)
+        return None if stretch is None or frame == stretch.first else frame - 1
+
+    def stretch(self, frame: int) -> Stretch | None:
+        """The sequence that a frame lies in; None for a still."""
+        for one in self.sequences:
+            if one.first <= frame < one.first + one.count:
+                return one
+        return None
+
+    def tags(self, frame: int) -> tuple[str, ...]:
+        """What boards may be restricted to: the name of the sequence or `STILLS`, "indoor" or "outdoor" light."""
+        stretch = self.stretch(frame)
+        name = str(self.frames[frame].row.get("environment") or "")
+        return (STILLS if stretch is None else stretch.name, *indoor_or_outdoor(name))
 
     def half(self, which: int, frame: int, *channels: str) -> dict[str, Any]:
         """Channels of one of the two renderings of a frame's reference, (H, W, C) by channel."""
         return decode(self.halves[which][frame], channels, widen=True)
+
+
+def shot_of(frame: Frame) -> Shot:
+    """Camera and lighting of a frame."""
+    from gibench.rendering.lighting import Shot
+
+    return getattr(frame, "shot", None) or Shot(frame.camera)
+
+
+@cache
+def indoor_or_outdoor(environment: str) -> tuple[str, ...]:
+    """Of a map that ships, by its name; nothing for others."""
+    from gibench.generators.environments.shipped import shipped_maps
+
+    return tuple("indoor" if one.indoor else "outdoor" for one in shipped_maps() if one.name == environment)
 
 
 def scene_name(room: int) -> str:
@@ -58,7 +113,7 @@ def scene_name(room: int) -> str:
 
 
 def scenes_in(root: Path, again: Path) -> list[SceneFiles]:
-    """Scenes of two datasets of the same frames on paths. Raises ResultsError where there is none."""
+    """Scenes of two datasets of the same frames. Raises ResultsError where there is none."""
     try:
         dataset, other = open_dataset(root), open_dataset(again)
     except DatasetError as problem:
@@ -70,9 +125,9 @@ def scenes_in(root: Path, again: Path) -> list[SceneFiles]:
             f"{root} has no frame: every room was rejected; choose another seed or other kinds"
         )
     scenes = []
-    for room, frames in dataset.frames.sort_values(["room", "step"]).groupby("room"):
-        number = int(str(room))
-        row = frames.iloc[0]
+    for number, found in groupby(sorted(dataset, key=lambda f: (f.room, f.view)), key=lambda f: f.room):
+        frames = tuple(found)
+        row = frames[0].row
         scenes.append(
             SceneFiles(
                 name=scene_name(number),
@@ -81,18 +136,13 @@ def scenes_in(root: Path, again: Path) -> list[SceneFiles]:
                 folder=dataset.room_folder(number),
                 sha256=_content(root, number),
                 resolution=(int(row["width"]), int(row["height"])),
-                cameras=tuple(
-                    (
-                        (float(f["camera_x"]), float(f["camera_y"]), float(f["camera_z"])),
-                        (float(f["target_x"]), float(f["target_y"]), float(f["target_z"])),
-                        float(f["fov"]),
-                    )
-                    for _, f in frames.iterrows()
-                ),
+                frames=frames,
+                sequences=_sequences(frames),
                 halves=(
-                    tuple(_inside(root, str(file)) for file in frames["file"]),
-                    tuple(_inside(again, str(file)) for file in frames["file"]),
+                    tuple(_inside(root, str(frame.row["file"])) for frame in frames),
+                    tuple(_inside(again, str(frame.row["file"])) for frame in frames),
                 ),
+                max_depth=int(dataset.manifest["recipe"]["max_depth"]),
             )
         )
     return scenes
@@ -105,6 +155,16 @@ def _inside(root: Path, file: str) -> Path:
         raise ResultsError(f"the scenes of this run cannot be read: {problem}") from None
 
 
+def _sequences(frames: tuple[Frame, ...]) -> tuple[Stretch, ...]:
+    """Stretches of frames that lie on one path, in the order of its steps."""
+    found: list[Stretch] = []
+    for name, members in groupby(enumerate(frames), key=lambda pair: str(pair[1].row["path"])):
+        numbers = [number for number, _ in members]
+        if name:
+            found.append(Stretch(name, numbers[0], len(numbers)))
+    return tuple(found)
+
+
 def _content(root: Path, room: int) -> str:
     files = room_record(root, room)["files"]
     # The same geometry once more, for viewers.
@@ -112,56 +172,19 @@ def _content(root: Path, room: int) -> str:
     return hashlib.sha256(json.dumps(known, sort_keys=True).encode()).hexdigest()
 
 
-class TrainingViews(Sequence[Frame]):
-    """The training views of a room. Whoever is handed one is charged with its rendering, whatever process reads it."""
+def lay_out(scene: SceneFiles, folder: Path) -> Path:
+    """A folder with the files of a scene but without its frames, which no method may see; gives that folder.
 
-    def __init__(self, dataset: Dataset | None) -> None:
-        """dataset: of this room's views alone; None where the run made none."""
-        self._dataset = dataset
-        self._booking = Booking(len(self))
-
-    def __len__(self) -> int:
-        """Number of views; asking costs nothing."""
-        return len(self._dataset) if self._dataset is not None else 0
-
-    @overload
-    def __getitem__(self, index: int) -> Frame: ...
-    @overload
-    def __getitem__(self, index: slice) -> list[Frame]: ...
-    def __getitem__(self, index: int | slice) -> Frame | list[Frame]:
-        """Hand out a view, or some. Raises IndexError."""
-        if isinstance(index, slice):
-            return [self[one] for one in range(*index.indices(len(self)))]
-        if self._dataset is None:
-            raise IndexError(f"view {index} of none")
-        frame = self._dataset[index]
-        self._booking.book(index % len(self))
-        return frame
-
-    def torch(self, channels: Sequence[str]) -> TorchDataset[dict[str, Tensor]]:
-        """Hand out all of them, as `Dataset.torch` does."""
-        if self._dataset is None:
-            raise ResultsError("this method asked for no channels of training views")
-        self._booking.book_all()
-        return self._dataset.torch(channels)
-
-    @property
-    def handed_out(self) -> list[int]:
-        """Numbers of the views that somebody was given."""
-        return self._booking.booked
-
-    @property
-    def seconds(self) -> float:
-        """That rendering these took."""
-        if self._dataset is None:
-            return 0.0
-        return float(sum(self._dataset[index].row["seconds"] for index in self.handed_out))
-
-
-def training_views(root: Path | None, room: int) -> TrainingViews:
-    """Training views of a room; none where the run made none."""
-    if root is None:
-        return TrainingViews(None)
-    dataset = open_dataset(root)
-    rows = dataset.frames[dataset.frames["room"] == room].reset_index(drop=True)
-    return TrainingViews(Dataset(root, dataset.manifest, rows))
+    Files are links to those of the scene where the file system has such, else copies. What is there stays.
+    """
+    root = scene.folder.parents[1]
+    for name in room_record(root, scene.room)["files"]:
+        place = folder / name
+        if place.exists():
+            continue
+        place.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            os.link(scene.folder / name, place)
+        except OSError:
+            shutil.copyfile(scene.folder / name, place)
+    return folder

@@ -1,6 +1,7 @@
 """Scoring: metrics of predictions that lie on disk, computed once each, so that a new metric needs no rerun.
 
-All frames of a path are seen under one exposure, that of its references, the specular part too. What the reference's
+All frames of a sequence are seen under one exposure, that of its references, and a still under its own; their parts
+too. What the reference's
 own noise costs is scored beside. A reference is the mean of two renderings a and b of the same variance, so its own
 error has the variance of (a − b)/2 = a − reference: metric(a, reference) is what a perfect method would get.
 """
@@ -28,6 +29,8 @@ from gibench.benchmarks.errors import ResultsError, RunError
 from gibench.benchmarks.records import Scores
 from gibench.benchmarks.result_files import FORMAT, RunFolder
 from gibench.benchmarks.scenes import SceneFiles, scenes_in
+from gibench.benchmarks.track import CHANNELS_OF
+from gibench.datasets.exr import present_channels
 from gibench.datasets.files import as_json, write_whole
 from gibench.datasets.making import default_threads
 from gibench.datasets.pool import leave_signals_to_parent
@@ -86,9 +89,9 @@ def score(
                 continue
             owners.append((id, scene))
     used = sorted({scene.name for _, scene in owners})
-    exposures = {name: exposure_of(folder, scenes[name]) for name in used}
+    exposures = {name: exposures_of(folder, scenes[name]) for name in used}
     units = [
-        _Unit(folder, id, scene, names, unusable, exposures[scene.name])
+        _Unit(folder, id, scene, names, tuple(run["parts"]), unusable, exposures[scene.name])
         for id, scene in [*owners, *((None, scenes[name]) for name in used)]
     ]
     wanting = [unit for unit in units if unit.missing()]
@@ -151,8 +154,9 @@ class _Unit:
     id: str | None
     scene: SceneFiles
     names: tuple[str, ...]
+    parts: tuple[str, ...]
     unusable: dict[str, str]
-    exposure: float
+    exposures: tuple[float, ...]
 
     def read(self) -> dict[str, Any]:
         """The file so far."""
@@ -163,8 +167,9 @@ class _Unit:
     def missing(self) -> list[str]:
         """Metrics that the file lacks and that can be computed, or whose reason to be skipped it does not give."""
         scores = self.read()
-        known = {
-            metric for group in ("frames", "sequences") for part in scores[group].values() for metric in part
+        known = {metric for part in scores["frames"].values() for metric in part}
+        known |= {
+            metric for part in scores["sequences"].values() for named in part.values() for metric in named
         }
         return [
             name
@@ -185,11 +190,11 @@ def _scored(unit: _Unit) -> tuple[dict[str, str], str]:
     """Complete a score file; returns metric → why it was skipped, and what is wrong with the result, if anything."""
     scores, missing = unit.read(), unit.missing()
     skipped = {name: unit.unusable[name] for name in missing if name in unit.unusable}
-    frames = (
-        (lambda frame: half_parts(unit.scene, 0, frame))
-        if unit.id is None
-        else _predicted(unit.folder, unit.id)
-    )
+    predicted = _predicted(unit.folder, unit.id) if unit.id is not None else _half(unit.scene)
+
+    def frames(frame: int) -> dict[str, Image]:
+        return {part: image for part, image in predicted(frame).items() if part in unit.parts}
+
     chosen = [metrics.metric(name) for name in missing if name not in skipped]
     try:
         new = compute(
@@ -197,18 +202,20 @@ def _scored(unit: _Unit) -> tuple[dict[str, str], str]:
             unit.scene,
             [d.name for d in chosen if d.inputs == "image"],
             [d.name for d in chosen if d.inputs == "sequence"],
-            unit.exposure,
+            unit.exposures,
         )
     except GibenchError as problem:
         return {}, str(problem)
-    for group in ("frames", "sequences"):
-        for part, values in new[group].items():
-            scores[group].setdefault(part, {}).update(values)
+    for part, values in new["frames"].items():
+        scores["frames"].setdefault(part, {}).update(values)
+    for part, sequences in new["sequences"].items():
+        for name, values in sequences.items():
+            scores["sequences"].setdefault(part, {}).setdefault(name, {}).update(values)
     skipped |= new["skipped"]
     scores["skipped"] = {
         name: why for name, why in {**scores["skipped"], **skipped}.items() if name not in new["done"]
     }
-    scores |= {"gibench": gibench.__version__, "exposure": unit.exposure}
+    scores |= {"gibench": gibench.__version__, "exposures": list(unit.exposures)}
     unit.folder.scores.mkdir(exist_ok=True)
     write_whole(unit.folder.score_file(unit.id or unit.scene.name), as_json(_finite(scores)))
     return skipped, ""
@@ -223,25 +230,40 @@ def _finite(value: Any) -> Any:
     return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
-def exposure_of(folder: RunFolder, scene: SceneFiles) -> float:
-    """The exposure that a whole path is seen under: `reference_exposure` of its references, shared."""
+def exposures_of(folder: RunFolder, scene: SceneFiles) -> tuple[float, ...]:
+    """The exposure that each frame is seen under: `reference_exposure`, shared by the frames of a sequence."""
     known = read_scores(folder, scene.name)
     if known is not None:
-        return float(known["exposure"])
-    references = np.stack([reference_parts(scene, frame)["full"] for frame in range(len(scene.cameras))])
-    return float(metrics.reference_exposure(references, shared=True))
+        return tuple(float(exposure) for exposure in known["exposures"])
+    exposures = [0.0] * len(scene)
+    stills = [range(frame, frame + 1) for frame in range(len(scene)) if scene.stretch(frame) is None]
+    for frames in (*stills, *(range(s.first, s.first + s.count) for s in scene.sequences)):
+        references = np.stack([reference_parts(scene, frame)["full"] for frame in frames])
+        shared = float(metrics.reference_exposure(references, shared=True))
+        exposures[frames.start : frames.stop] = [shared] * len(frames)
+    return tuple(exposures)
 
 
 def reference_parts(scene: SceneFiles, frame: int) -> dict[str, Image]:
-    """What predictions are scored against: "full" and "specular", (H, W, 3)."""
+    """What predictions are scored against, (H, W, 3) by part: those whose channels are stored."""
     first, second = (half_parts(scene, which, frame) for which in (0, 1))
     return {part: 0.5 * (image + second[part]) for part, image in first.items()}
 
 
 def half_parts(scene: SceneFiles, which: int, frame: int) -> dict[str, Image]:
     """The same of one of the two renderings of the reference."""
-    read = scene.half(which, frame, "color", "direct_specular", "indirect_specular")
-    return {"full": read["color"], "specular": read["direct_specular"] + read["indirect_specular"]}
+    there = set(present_channels(scene.halves[which][frame]))
+    parts = {part: channels for part, channels in CHANNELS_OF.items() if there.issuperset(channels)}
+    read = scene.half(which, frame, *dict.fromkeys(c for channels in parts.values() for c in channels))
+    return {part: sum_of([read[channel] for channel in channels]) for part, channels in parts.items()}
+
+
+def sum_of(images: Sequence[Image]) -> Image:
+    """Sum of one image or more."""
+    total = images[0]
+    for image in images[1:]:
+        total = total + image
+    return total
 
 
 def _predicted(folder: RunFolder, id: str) -> Frames:
@@ -249,37 +271,56 @@ def _predicted(folder: RunFolder, id: str) -> Frames:
     return lambda frame: predictions.read(folder.root, id, frame, files[f"{frame:04d}.exr"])
 
 
+def _half(scene: SceneFiles) -> Frames:
+    return lambda frame: half_parts(scene, 0, frame)
+
+
 def compute(
-    frames: Frames, scene: SceneFiles, image: Sequence[str], sequence: Sequence[str], exposure: float
+    frames: Frames,
+    scene: SceneFiles,
+    image: Sequence[str],
+    sequence: Sequence[str],
+    exposures: Sequence[float],
 ) -> dict[str, Any]:
     """Compute metrics of all frames of a scene, two frames in memory at a time.
 
-    Returns "frames": part → metric → a value a frame; "sequences": part → metric → the mean over the steps of the
-    path, with "_prediction" and "_reference" beside (see `evaluate_sequence`); "skipped": metric → why; "done".
+    Returns "frames": part → metric → a value a frame; "sequences": part → name of the sequence → metric → the mean over
+    its steps, with "_prediction" and "_reference" beside (see `evaluate_sequence`); "skipped": metric → why; "done".
     """
     values: dict[str, dict[str, list[float]]] = {}
-    steps: dict[str, dict[str, list[float]]] = {}
+    steps: dict[str, dict[str, dict[str, list[float]]]] = {}
     skipped: dict[str, str] = {}
     before: _Step | None = None
-    for number in range(len(scene.cameras)):
-        now = _Step(frames(number), reference_parts(scene, number), scene, number if sequence else None)
+    for number in range(len(scene)):
+        stretch = scene.stretch(number) if sequence else None
+        now = _Step(
+            frames(number), reference_parts(scene, number), scene, None if stretch is None else number
+        )
+        exposure = exposures[number]
         for part, pred in now.predicted.items():
+            if part not in now.references:
+                continue
             if number == 0 and not values:
                 skipped |= _impossible(pred, image)
             possible = [name for name in image if name not in skipped]
             row = metrics.evaluate(pred, now.references[part], metrics=possible, exposure=exposure)
             for name in possible:
                 values.setdefault(part, {}).setdefault(name, []).append(float(np.float64(row[name])))
-            if sequence and before is not None:
+            if stretch is not None and scene.before(number) is not None and before is not None:
                 for name, value in _step(before, now, part, sequence, exposure).items():
-                    steps.setdefault(part, {}).setdefault(name, []).append(value)
+                    named = steps.setdefault(part, {}).setdefault(stretch.name, {})
+                    named.setdefault(name, []).append(value)
         before = now
-    sequences = {part: {name: _mean(row) for name, row in rows.items()} for part, rows in steps.items()}
-    if len(scene.cameras) < 2:
-        skipped |= dict.fromkeys(sequence, "the path has one frame")
+    if not any(stretch.count > 1 for stretch in scene.sequences):
+        skipped |= dict.fromkeys(sequence, "there is no sequence of two frames or more")
     return {
         "frames": values,
-        "sequences": sequences,
+        "sequences": {
+            part: {
+                stretch: {name: _mean(row) for name, row in rows.items()} for stretch, rows in named.items()
+            }
+            for part, named in steps.items()
+        },
         "skipped": skipped,
         "done": [name for name in [*image, *sequence] if name not in skipped],
     }

@@ -42,12 +42,12 @@ class Difference:
 
 
 def frame_values(results: Results, name: str, part: str) -> pd.DataFrame:
-    """A row a frame, or for a temporal metric a row a path: label, method, scene, frame, seed, machine, value.
+    """A row a frame, or for a temporal metric a row a sequence: label, method, scene, frame, seed, machine, value.
 
     Undefined values are left out. Raises UnknownMetricError, ResultsError where the metric was not computed.
     """
     temporal = metric(name).inputs == "sequence"
-    table = results.sequences.assign(frame=WHOLE_PATH) if temporal else results.frames
+    table = _numbered(results.sequences) if temporal else results.frames
     table = table[(table["metric"] == name) & (table["part"] == part)]
     columns = ["result", "label", "method", "scene", "seed", "machine"]
     table = table.merge(results.results[columns], on="result").dropna(subset="value")
@@ -55,6 +55,12 @@ def frame_values(results: Results, name: str, part: str) -> pd.DataFrame:
         why = results.skipped.get(name, f"`gibench bench score {results.root}` computes it")
         raise ResultsError(f"{results.root} has no {name} of the {part} image: {why}")
     return table[["label", "method", "scene", "frame", "seed", "machine", "value"]]
+
+
+def _numbered(sequences: pd.DataFrame) -> pd.DataFrame:
+    """Sequences with the numbers that they have in `Results.floor`."""
+    order = sequences.groupby(["result", "metric", "part"], sort=False).cumcount()
+    return sequences.assign(frame=WHOLE_PATH - order)
 
 
 def floor(results: Results, name: str, part: str) -> float:

@@ -18,20 +18,22 @@ from gibench.datasets.recipes import Recipe, check_recipe
 from gibench.metrics import METRICS
 
 Names = Annotated[tuple[str, ...], Field(strict=False)]
-Part = Literal["full", "specular"]
+Part = Literal["full", "specular", "indirect"]
 Value = int | float | str | bool
 
-#: Channels of a frame of the path without which nothing can be scored: the parts, and what tells which pixels the
-#: frame before shows too.
-SCORED = (
-    "color",
-    "direct_specular",
-    "indirect_specular",
-    "position",
-    "shape_id",
-    "motion",
-    "motion_valid",
-)
+#: Channels of a frame whose sum a part of the image is.
+CHANNELS_OF: dict[str, tuple[str, ...]] = {
+    "full": ("color",),
+    "specular": ("direct_specular", "indirect_specular"),
+    "indirect": ("indirect_diffuse", "indirect_specular"),
+}
+
+#: Channels that tell which pixels the frame before shows too, for metrics of sequences.
+MOVING = ("position", "shape_id", "motion", "motion_valid")
+
+
+#: Keys of a recipe for frames that are held out.
+HELD_OUT = ("path_views", "held_out", "sequences")
 
 
 class _Strict(BaseModel):
@@ -41,11 +43,13 @@ class _Strict(BaseModel):
 class Budget(_Strict):
     """What a result may take before it counts as failed, seconds.
 
-    prepare: of a preparation. render: of all frames of one setting, warm-up included.
+    prepare: of a preparation, or of a training on rooms. render: of all frames of one setting, warm-up included.
+    training: after which a training ends by itself, with the best weights so far; it has not failed then.
     """
 
     prepare: float = Field(gt=0)
     render: float = Field(gt=0)
+    training: float | None = Field(None, gt=0)
 
 
 class MethodPlan(_Strict):
@@ -64,9 +68,10 @@ class Preset(_Strict):
 
     rooms: how many scenes. seed: decides the rooms. seeds: of the methods; those that are not trained run the first
     alone. warmup: frames rendered before the clock counts. room: keys of a recipe that training views and references
-    share. training, reference: keys of the recipe of either; references are rendered twice. knobs: values for every
-    method that has a knob of that name, so that all share what is baked. methods: by id; a method that is not named
-    runs at its defaults.
+    share. training, reference: keys of the recipe of either; references are rendered twice, and without `training`
+    there is nothing to learn from. training_rooms, training_seed: of a track that trains on rooms of their own. knobs:
+    values for every method that has a knob of that name, so that all share what is baked. methods: by id; a method that
+    is not named runs at its defaults.
     """
 
     rooms: int = Field(ge=1)
@@ -74,7 +79,9 @@ class Preset(_Strict):
     seeds: Annotated[tuple[int, ...], Field(strict=False, min_length=1)] = (0,)
     warmup: int = Field(ge=0)
     room: dict[str, Any]
-    training: dict[str, Any]
+    training: dict[str, Any] | None = None
+    training_rooms: int | None = Field(None, ge=1)
+    training_seed: int | None = Field(None, ge=0)
     reference: dict[str, Any]
     budget: Budget
     knobs: dict[str, Value] = {}
@@ -86,26 +93,21 @@ class Preset(_Strict):
         shared = {knob.name: self.knobs[knob.name] for knob in method.knobs if knob.name in self.knobs}
         return MethodPlan(base={**shared, **plan.base}, vary=plan.vary)
 
-    @property
-    def path_frames(self) -> int:
-        """Frames of the path that are scored."""
-        return int(self.room["path_views"])
-
     def recipe(
         self,
         which: Literal["training", "reference", "reference-again"],
         rooms: int | None = None,
         scenes: Mapping[str, Any] | None = None,
     ) -> Recipe:
-        """The recipe of the training views, or of the frames on the path, once or once more with other samples.
+        """The recipe of the training views, or of the frames that are held out, once or once more with other samples.
 
-        All make the same rooms: what decides a room and its cameras is in `room`. scenes: keys of a recipe that put
-        scene files in the place of rooms. Raises TrackError.
+        All make the same rooms, for what decides a room and its cameras is in `room`; but where there are
+        `training_rooms` the training views are of those. scenes: keys of a recipe that put scene files in the place of
+        rooms, those to train on excepted. Raises TrackError.
         """
-        own = self.training if which == "training" else self.reference
         values = {
             **self.room,
-            **own,
+            **((self.training or {}) if which == "training" else self.reference),
             "rooms": rooms or self.rooms,
             "seed": self.seed,
             "rendered": "stills" if which == "training" else "path",
@@ -113,6 +115,10 @@ class Preset(_Strict):
             "splits": {"test": 1.0},
             **(scenes or {}),
         }
+        if which == "training" and self.training_rooms is not None:
+            apart = (*HELD_OUT, "path", "path_rooms", *(scenes or {}))
+            values = {key: value for key, value in values.items() if key not in apart}
+            values |= {"rooms": self.training_rooms, "seed": self.training_seed, "rendered": "all"}
         try:
             return check_recipe(values, source=which)
         except RecipeError as problem:
@@ -122,8 +128,9 @@ class Preset(_Strict):
 class Track(_Strict):
     """A question: what changes at run time, what may be prepared, what is scored.
 
-    id, title, question: for people. varies: what changes from frame to frame. prepared: what may be baked or trained,
-    and for what. parts: of the image that are scored. metrics: of single frames, sequence_metrics: of the path
+    id, title, question: for people. varies: what changes from frame to frame. prepare_on: "scene" where methods train
+    for each scene, "rooms" where they train once, on rooms of their own. prepared: what may be baked or trained, and
+    for what. parts: of the image that are scored. metrics: of single frames, sequence_metrics: of the path
     (`gibench.metrics`). source: papers that ask it.
     """
 
@@ -131,6 +138,7 @@ class Track(_Strict):
     title: str
     question: str
     varies: Names
+    prepare_on: Literal["scene", "rooms"] = "scene"
     prepared: str
     source: Names
     parts: Annotated[tuple[Part, ...], Field(strict=False, min_length=1)]
@@ -194,12 +202,41 @@ def check_track(values: Mapping[str, Any], *, source: str = "track") -> Track:
         raise TrackError(f"{source}: {place}: {problem['msg'].removeprefix('Value error, ')}") from None
     for name, preset in track.presets.items():
         place = f"{source}, preset {name}"
-        if not preset.room.get("path_views"):
-            raise TrackError(f"{place}: room: path_views is missing: without a path nothing is scored")
+        if not any(preset.room.get(key) or preset.reference.get(key) for key in HELD_OUT):
+            raise TrackError(
+                f"{place}: room: {', '.join(HELD_OUT)} are missing: without one of them nothing is scored"
+            )
+        _check_training(track, preset, place)
         try:
-            reference, _ = preset.recipe("reference"), preset.recipe("training")
+            reference = preset.recipe("reference")
+            if preset.training is not None:
+                preset.recipe("training")
         except TrackError as problem:
             raise TrackError(f"{place}: {problem}") from None
-        if missing := [channel for channel in SCORED if channel not in reference.channels]:
+        needed = [channel for part in track.parts for channel in CHANNELS_OF[part]]
+        needed += MOVING if track.sequence_metrics else ()
+        if missing := [c for c in dict.fromkeys(needed) if c not in reference.channels]:
             raise TrackError(f"{place}: reference: channels lacks {', '.join(missing)}, which scoring needs")
     return track
+
+
+def _check_training(track: Track, preset: Preset, place: str) -> None:
+    """Refuse rooms to train on that are not asked for, not there, or scored."""
+    own = (preset.training_rooms, preset.training_seed)
+    if track.prepare_on == "scene" and own != (None, None):
+        raise TrackError(f'{place}: training_rooms and training_seed need prepare_on = "rooms"')
+    if track.prepare_on == "rooms":
+        if preset.training is None or None in own:
+            raise TrackError(
+                f'{place}: prepare_on = "rooms" needs training, training_rooms and training_seed'
+            )
+        if preset.training_seed == preset.seed:
+            raise TrackError(
+                f"{place}: training_seed is {preset.seed}, as seed is: the rooms to train on would be those that are "
+                "scored; choose another"
+            )
+    if preset.budget.training is not None and preset.budget.training >= preset.budget.prepare:
+        raise TrackError(
+            f"{place}: budget: training ({preset.budget.training:g} s) must be below prepare "
+            f"({preset.budget.prepare:g} s), after which the process is killed"
+        )

@@ -1,9 +1,11 @@
-"""The process of a result: prepares a method for a scene and renders the path, setting by setting.
+"""The process of a result: prepares a method for a scene and renders its frames, setting by setting.
 
-One preparation serves all settings that it is valid for; each setting is a result of its own. What happens is told
-to the process that started this one, message by message: a pair of a name and a content.
+One preparation serves all settings that it is valid for; each setting is a result of its own. A process without a scene
+trains a method on rooms. What happens is told to the process that started this one, message by message: a pair of a
+name and a content.
 
     ("ready", seconds)      the renderer and the scene are loaded
+    ("trained", dict)       times of the training
     ("prepared", dict)      times of the preparation
     ("result", dict)        one setting is done; its frames lie in its partial folder
     ("failed", dict)        reason, traceback; the process ends
@@ -19,14 +21,13 @@ import hashlib
 import io
 import math
 import os
-import resource
 import signal
 import sys
 import threading
 import time
 import traceback
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -37,8 +38,12 @@ from gibench.baselines.bakes import Bake, BakeCache
 from gibench.baselines.method import Method, Prediction, Setting, Site, View
 from gibench.baselines.sources import digest
 from gibench.baselines.stages import Stages, synchronise
+from gibench.baselines.trained import trained
+from gibench.baselines.training_set import TrainingSet, training_set
 from gibench.benchmarks import predictions
-from gibench.benchmarks.scenes import SceneFiles, TrainingViews, training_views
+from gibench.benchmarks.costs import preparation
+from gibench.benchmarks.memory import gpu_peak_mb, peak_mb, reset_peak
+from gibench.benchmarks.scenes import SceneFiles, lay_out
 from gibench.datasets.files import sync_tree, through_no_link
 from gibench.datasets.pool import end_with_parent, leave_signals_to_parent
 from gibench.errors import GibenchError
@@ -46,26 +51,32 @@ from gibench.errors import GibenchError
 #: Lane of the random numbers that methods are given, far from those of the generators and the references.
 METHOD_LANE = 2000
 
-#: What a preparation is booked under, beside what none of them names.
-BOOKED = ("lightmap", "probes", "references", "training")
+#: Stands for the number of the room in the random numbers of a training on all rooms.
+ROOMS = 2**31
 
 
 @dataclass(frozen=True)
 class Task:
     """What one process does.
 
-    settings: (knobs, folder for the frames) of every result, all with the same baked settings. training: root of the
-    dataset of training views, None where the method reads none. bakes: root of the cache. machine: what bakes depend
-    on beside the scene. log: where output and tracebacks of crashes go.
+    scene: None for the process that trains on rooms. settings: (knobs, folder for the frames) of every result, all with
+    the same baked settings. training: root of the dataset of training views, None where the method reads none. rooms:
+    where what is trained on rooms is kept; None on tracks that train for each scene. site: folder for the files of the
+    scene that a method may see. bakes: root of the cache. machine: what bakes depend on beside the scene. seconds: of a
+    training. parts: of the image that are scored. log: where output and tracebacks of crashes go.
     """
 
     method: Method
     seed: int
-    scene: SceneFiles
+    scene: SceneFiles | None
     settings: tuple[tuple[dict[str, Setting], Path], ...]
     training: Path | None
+    rooms: Path | None
+    site: Path
     bakes: Path
     machine: dict[str, Any]
+    seconds: float | None
+    parts: tuple[str, ...]
     warmup: int
     variant: str
     threads: int
@@ -115,64 +126,120 @@ class _Session:
         os.environ.setdefault("OMP_NUM_THREADS", str(task.threads))
         os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
         from gibench.rendering import backend
-        from gibench.rendering.scene import load_scene
 
         backend.select_variant(task.variant)
         backend.limit_threads(task.threads)
-        scene = load_scene(task.scene.folder / "scene.xml", share_kernels=True)
-        views = training_views(task.training, task.scene.room)
-        bakes = BakeCache(task.bakes, task.scene.sha256, task.machine)
+        if task.scene is None:
+            self._train(started)
+        else:
+            _SceneSession(self.connection, task, task.scene).run(started)
+
+    def _train(self, started: float) -> None:
+        """Train on rooms; whoever prepares for a scene finds the weights."""
+        views, cache = on_rooms(self.task)
+        self.connection.send(("ready", time.perf_counter() - started))
+        reset_peak()
+        started = time.perf_counter()
+        bake = weights_of(self.task, cache, views, room=None)
+        wall = time.perf_counter() - started
+        cost = preparation(wall, {}, [bake], [bake], [views])
+        self.connection.send(("trained", {**cost, "peak_mb": peak_mb(), "gpu_mb": gpu_peak_mb()}))
+
+
+def on_rooms(task: Task) -> tuple[TrainingSet, BakeCache]:
+    """What a method trains on, and where its weights are kept, on a track that trains on rooms."""
+    assert task.rooms is not None
+    views = training_set(task.training)
+    return views, BakeCache(task.rooms, "rooms", task.machine, views)
+
+
+def weights_of(task: Task, cache: BakeCache, views: TrainingSet, room: int | None) -> Bake:
+    """The weights of the method of a task. room: None where it trains on many."""
+    seed = method_seed(task.seed, ROOMS if room is None else room)
+    return trained(cache, task.method, task.settings[0][0], views, seconds=task.seconds, seed=seed)
+
+
+class _SceneSession:
+    def __init__(self, connection: Connection, task: Task, scene: SceneFiles) -> None:
+        self.connection, self.task, self.scene = connection, task, scene
+        self.rig: Any = None
+
+    def run(self, started: float) -> None:
+        from gibench.rendering.light_rig import LightRig
+        from gibench.rendering.scene import load_scene
+
+        task, files = self.task, self.scene
+        folder = lay_out(files, task.site)
+        scene = load_scene(folder / "scene.xml", share_kernels=True)
+        kinds = {shot.lighting.kind for shot in files.shots}
+        if kinds != {"own"}:
+            self.rig = LightRig(scene, panoramas="environment" in kinds)
+            scene = self.rig.scene
+        views = [training_set(None if task.rooms else task.training, files.room)]
+        bakes = BakeCache(task.bakes, files.sha256, task.machine, views[0])
+        caches = [bakes]
+        if task.method.trains and task.rooms is not None:
+            rooms, cache = on_rooms(task)
+            views, caches = [*views, rooms], [*caches, cache]
         stages = Stages()
         site = Site(
             scene=scene,
-            folder=task.scene.folder,
-            resolution=task.scene.resolution,
-            training=views,
-            seed=method_seed(task.seed, task.scene.room),
+            folder=folder,
+            resolution=files.resolution,
+            training=views[0],
+            seed=method_seed(task.seed, files.room),
             bakes=bakes,
             stages=stages,
+            max_depth=files.max_depth,
+            seconds=task.seconds,
+            parts=task.parts,
+            rig=self.rig,
         )
         implementation_class = task.method.load()
-        digest(
-            implementation_class.__module__
-        )  # reads the sources that bakes are keyed by, outside of the clock
+        # Read the sources that bakes are keyed by outside of the clock.
+        digest(implementation_class.__module__)
         self.connection.send(("ready", time.perf_counter() - started))
 
-        before = {path.name for path in task.bakes.iterdir()} if task.bakes.is_dir() else set()
+        before = {bake.name for cache in caches for bake in _inside(cache.root)}
         reset_peak()
         synchronise()
         started = time.perf_counter()
+        if task.method.trains:
+            room = files.room if task.rooms is None else None
+            weights = weights_of(task, caches[-1], views[-1], room)
+            site = replace(site, weights=weights.folder)
         implementation = implementation_class(task.settings[0][0])
         implementation.prepare(site)
         synchronise()
         wall = time.perf_counter() - started
-        made = [bake for bake in bakes.used if bake.folder.name not in before]
-        prepared = preparation(wall, stages.seconds, bakes.used, made, views)
+        used = [bake for cache in caches for bake in cache.used]
+        made = [bake for bake in used if bake.folder.name not in before]
+        prepared = preparation(wall, stages.seconds, used, made, views)
         self.connection.send(("prepared", {**prepared, "peak_mb": peak_mb(), "gpu_mb": gpu_peak_mb()}))
 
-        for number, (settings, folder) in enumerate(task.settings):
+        for number, (settings, frames) in enumerate(task.settings):
             if number:
                 adjust = getattr(implementation, "adjust", None)
                 if adjust is None:
                     return
                 adjust(settings)
-            self.connection.send(("result", self._rendered(implementation, folder)))
+            self.connection.send(("result", self._rendered(implementation, frames)))
 
     def _rendered(self, implementation: Any, folder: Path) -> dict[str, Any]:
-        """Render the path, the clock around every call; check and keep each frame outside of it."""
-        cameras = len(self.task.scene.cameras)
+        """Render the frames, the clock around every call; check and keep each frame outside of it."""
+        resolution = self.scene.resolution
         folder.mkdir(parents=True)
         reset_peak()
         started = time.perf_counter()
-        for frame in range(min(self.task.warmup, cameras)):
-            # A short path of its own: frame 0 of the real one forgets it.
-            predictions.checked(
-                implementation.render(self._view(frame), Stages()), self.task.scene.resolution
-            )
+        for frame in range(min(self.task.warmup, len(self.scene))):
+            # Frame 0 of the real ones forgets them.
+            self._light(frame)
+            predictions.checked(implementation.render(self._view(frame), Stages()), resolution)
         synchronise()
         warmup = time.perf_counter() - started
         frames, files, kinds = [], {}, None
-        for frame in range(cameras):
+        for frame in range(len(self.scene)):
+            lighting = self._light(frame)
             stages = Stages()
             view = self._view(frame)
             synchronise()
@@ -183,13 +250,13 @@ class _Session:
             synchronise()
             seconds = time.perf_counter() - started
             try:
-                parts = predictions.checked(prediction, self.task.scene.resolution)
+                parts = predictions.checked(prediction, resolution)
             except predictions.BadPrediction as problem:
                 raise predictions.BadPrediction(f"frame {frame}: {problem}") from None
             if frame and parts.keys() != kinds:
                 raise predictions.BadPrediction(f"frame {frame}: some parts are there in some frames only")
             kinds = parts.keys()
-            content = predictions.encode(parts)
+            content = predictions.encode({part: parts[part] for part in parts if part in self.task.parts})
             name = f"{frame:04d}.exr"
             (folder / name).write_bytes(content)
             files[name] = {"sha256": hashlib.sha256(content).hexdigest(), "bytes": len(content)}
@@ -197,6 +264,7 @@ class _Session:
                 {
                     "seconds": seconds,
                     "stages": stages.seconds,
+                    "lighting_seconds": lighting,
                     "extra": {key: _number(value) for key, value in prediction.extra.items()},
                 }
             )
@@ -209,99 +277,31 @@ class _Session:
             "gpu_mb": gpu_peak_mb(),
         }
 
-    def _view(self, frame: int) -> View:
-        from gibench.rendering.camera import PinholeCamera
+    def _light(self, frame: int) -> float:
+        """Light the scene as a frame has it, which is no method's work; the seconds that it took."""
+        if self.rig is None:
+            return 0.0
+        synchronise()
+        started = time.perf_counter()
+        self.rig.set(self.scene.shots[frame].lighting)
+        synchronise()
+        return time.perf_counter() - started
 
-        scene = self.task.scene
+    def _view(self, frame: int) -> View:
+        before = self.scene.before(frame)
         return View(
-            camera=PinholeCamera(*scene.cameras[frame]),
-            previous=PinholeCamera(*scene.cameras[frame - 1]) if frame else None,
-            resolution=scene.resolution,
+            shot=self.scene.shots[frame],
+            previous=None if before is None else self.scene.shots[before],
+            resolution=self.scene.resolution,
             index=frame,
-            seed=method_seed(self.task.seed, scene.room, frame),
+            seed=method_seed(self.task.seed, self.scene.room, frame),
         )
+
+
+def _inside(folder: Path) -> list[Path]:
+    return list(folder.iterdir()) if folder.is_dir() else []
 
 
 def _number(value: Any) -> float | None:
     """A number of a method's own; None for what JSON has no number for."""
     return float(value) if math.isfinite(value) else None
-
-
-def preparation(
-    wall: float,
-    stages: dict[str, float],
-    used: list[Bake],
-    made: list[Bake],
-    views: TrainingViews,
-) -> dict[str, Any]:
-    """What a preparation cost, whoever paid for it first.
-
-    wall: seconds of `prepare`. stages: seconds by stage in it. used: bakes that it read, made: those of them that were
-    not there before. A bake that was there counts with what making it took; so do the views that were handed out.
-    Returns seconds (all of it), one entry for each of `BOOKED`, other, bytes of the bakes, wall, and lists.
-    """
-    booked = dict.fromkeys(BOOKED, 0.0)
-    booked["references"] = views.seconds
-    other = 0.0
-    for bake in used:
-        if bake.kind in booked:
-            booked[bake.kind] += bake.seconds
-        else:
-            other += bake.seconds
-    in_stages = 0.0
-    for name, seconds in stages.items():
-        # A stage around the making of a bake of its name holds the same seconds once more.
-        seconds = max(0.0, seconds - sum(bake.seconds for bake in made if bake.kind == name))
-        in_stages += seconds
-        if name in booked:
-            booked[name] += seconds
-        else:
-            other += seconds
-    other += max(0.0, wall - in_stages - sum(bake.seconds for bake in made))
-    return {
-        "seconds": sum(booked.values()) + other,
-        **booked,
-        "other": other,
-        "bytes": sum(bake.size for bake in used),
-        "wall_seconds": wall,
-        "made_seconds": sum(bake.seconds for bake in made),
-        "stages": dict(stages),
-        "bakes": [
-            {"kind": bake.kind, "folder": bake.folder.name, "seconds": bake.seconds, "bytes": bake.size}
-            for bake in used
-        ],
-        "training_views_read": len(views.handed_out),
-    }
-
-
-def reset_peak() -> None:
-    """Forget the peak of memory so far, where the system can (Linux; the GPU always)."""
-    with suppress(OSError):
-        Path("/proc/self/clear_refs").write_text("5")
-    if drjit := sys.modules.get("drjit"):
-        drjit.detail.malloc_clear_statistics()
-    torch = sys.modules.get("torch")
-    if torch is not None and torch.cuda.is_available() and torch.cuda.is_initialized():
-        torch.cuda.reset_peak_memory_stats()
-
-
-def peak_mb() -> float:
-    """Largest resident memory of this process since `reset_peak`, in 10⁶ bytes."""
-    with suppress(OSError):
-        for line in Path("/proc/self/status").read_text().splitlines():
-            if line.startswith("VmHWM:"):
-                return int(line.split()[1]) * 1024 / 1e6
-    unit = 1 if sys.platform == "darwin" else 1024
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e6
-
-
-def gpu_peak_mb() -> float | None:
-    """Largest memory on the GPU since `reset_peak`, in 10⁶ bytes; None without one."""
-    total, is_there = 0.0, False
-    mitsuba, drjit = sys.modules.get("mitsuba"), sys.modules.get("drjit")
-    if mitsuba is not None and drjit is not None and str(mitsuba.variant()).startswith("cuda"):
-        total, is_there = total + drjit.detail.malloc_watermark(drjit.JitBackend.CUDA), True
-    torch = sys.modules.get("torch")
-    if torch is not None and torch.cuda.is_available() and torch.cuda.is_initialized():
-        total, is_there = total + torch.cuda.max_memory_allocated(), True
-    return total / 1e6 if is_there else None

@@ -60,7 +60,8 @@ def run_track(
     """Bake, time and score methods on a track, or continue such a run."""
     from gibench.benchmarks.equal_time import search
     from gibench.benchmarks.errors import RunError, TrackError
-    from gibench.benchmarks.running import Order, Run, ordered_methods, run
+    from gibench.benchmarks.orders import Order, ordered_methods
+    from gibench.benchmarks.running import Run, run
     from gibench.benchmarks.scoring import Scored, score
     from gibench.benchmarks.settings import parse_overrides
     from gibench.benchmarks.track import load_track

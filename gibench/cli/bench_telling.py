@@ -14,7 +14,7 @@ from gibench.benchmarks.registry import installed
 from gibench.benchmarks.results import Results, load
 from gibench.benchmarks.running import Report, State
 from gibench.benchmarks.scoring import Scored
-from gibench.benchmarks.track import load_track, track_names
+from gibench.benchmarks.track import Preset, load_track, track_names
 from gibench.cli.output import one_line, say
 from gibench.cli.progress import QUIET_SECONDS, duration
 from gibench.errors import GibenchError
@@ -36,6 +36,9 @@ class Teller:
         if record is not None:
             place = f"[{state.done:>{len(str(state.of))}}/{state.of}] {record['config']['scene']}"
             self._line(f"{place} {_cut(record['label'], 32):<32} {_outcome(record)}")
+        elif (training := state.training) is not None:
+            took = f"{duration(training['training'])}, with its views {duration(training['seconds'])}"
+            self._line(f"trained on rooms: {training['method']} (seed {training['seed']}) {took}")
         elif state.scenes is not None and time.monotonic() - self._said >= QUIET_SECONDS:
             scenes = state.scenes
             self._line(
@@ -136,11 +139,22 @@ def tell_tracks(only: str | None) -> None:
         track = load_track(name)
         say(f"track {track.id}: {track.question}")
         for preset_name, preset in track.presets.items():
-            width, height = preset.recipe("reference").resolution
-            say(
-                f"  {preset_name:<8} {preset.rooms} rooms, {preset.path_frames} frames of {width}x{height}, up to "
-                f"{preset.recipe('training').views} training views"
-            )
+            say(f"  {preset_name:<8} {_size(preset)}")
+
+
+def _size(preset: Preset) -> str:
+    reference = preset.recipe("reference")
+    width, height = reference.resolution
+    held_out = [len(reference.rendered_views(room=room)) for room in range(preset.rooms)]
+    most = f"{held_out[0]} frames" if min(held_out) == held_out[0] else f"up to {held_out[0]} frames"
+    text = f"{preset.rooms} rooms, {most} of {width}x{height}"
+    if preset.training is None:
+        return f"{text}, nothing to train on"
+    training = preset.recipe("training")
+    views = len(training.rendered_views())
+    if preset.training_rooms is not None:
+        return f"{text}, {preset.training_rooms} rooms × {views} training views"
+    return f"{text}, up to {views} training views"
 
 
 def tell_methods(track: str | None) -> None:

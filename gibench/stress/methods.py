@@ -23,6 +23,7 @@ from gibench.baselines.method import Method, Prediction, Site, View
 from gibench.baselines.stages import Stages
 from gibench.datasets.exr import HALF_TOLERANCE
 from gibench.rendering.camera import PinholeCamera
+from gibench.rendering.lighting import Shot
 from gibench.rendering.render import MAX_DEPTH
 from gibench.rendering.scene import Scene, load_dict
 from gibench.stress import meshes
@@ -86,7 +87,7 @@ def frames(site: Site, camera: PinholeCamera, methods: tuple[Method, ...] = METH
             method.settings({key: value for key, value in SETTINGS.items() if key in names})
         )
         running.prepare(site)
-        found[method.id] = running.render(View(camera, None, RESOLUTION, 0, 0), Stages())
+        found[method.id] = running.render(View(Shot(camera), None, RESOLUTION, 0, 0), Stages())
     return found
 
 

@@ -11,6 +11,7 @@ from gibench.baselines.bakes import BakeCache
 from gibench.baselines.method import Site, View
 from gibench.baselines.stages import Stages
 from gibench.rendering.camera import PinholeCamera
+from gibench.rendering.lighting import Shot
 from gibench.rendering.scene import Scene
 from tests.rendering import scenes
 
@@ -23,7 +24,7 @@ def site(scene: Scene, folder: Path, name: str = "scene") -> Site:
 
 
 def view(camera: PinholeCamera, seed: int = 0, resolution: tuple[int, int] = RESOLUTION) -> View:
-    return View(camera, None, resolution, 0, seed)
+    return View(Shot(camera), None, resolution, 0, seed)
 
 
 def lit_box(floor: dict[str, Any], reflectance: float = 0.0, half: float = 1.0) -> dict[str, Any]:

@@ -5,9 +5,10 @@ from pathlib import Path
 
 import pytest
 
+from gibench.benchmarks.orders import Order, ordered_methods
 from gibench.benchmarks.result_files import RunFolder
 from gibench.benchmarks.results import load
-from gibench.benchmarks.running import Order, Report, ordered_methods, run
+from gibench.benchmarks.running import Report, run
 from gibench.benchmarks.scoring import score
 from gibench.benchmarks.track import check_track
 from tests.benchmarks import toys

@@ -6,14 +6,15 @@ import pandas as pd
 import pytest
 
 from gibench.baselines.bakes import Bake
-from gibench.benchmarks.scenes import TrainingViews
-from gibench.benchmarks.worker import method_seed, preparation
+from gibench.baselines.training_set import TrainingSet
+from gibench.benchmarks.costs import preparation
+from gibench.benchmarks.worker import method_seed
 from gibench.datasets.loading import Dataset
 
 
-def views(*handed_out: bool) -> TrainingViews:
+def views(*handed_out: bool) -> TrainingSet:
     rows = [{"room": 0, "file": "none", "seconds": 10.0 * (i + 1)} for i in range(len(handed_out))]
-    made = TrainingViews(Dataset(Path("none"), {}, pd.DataFrame(rows)))
+    made = TrainingSet(Dataset(Path("none"), {}, pd.DataFrame(rows)))
     for index, given in enumerate(handed_out):
         if given:
             made[index]
@@ -25,8 +26,8 @@ PROBES = Bake("probes", Path("b"), 7.0, 200)
 
 
 def test_who_finds_a_bake_pays_what_its_maker_paid():
-    first = preparation(13.0, {}, [LIGHTMAP, PROBES], [LIGHTMAP, PROBES], views())
-    second = preparation(1.0, {}, [LIGHTMAP, PROBES], [], views())
+    first = preparation(13.0, {}, [LIGHTMAP, PROBES], [LIGHTMAP, PROBES], [views()])
+    second = preparation(1.0, {}, [LIGHTMAP, PROBES], [], [views()])
     for paid in (first, second):
         assert paid["lightmap"] == 5.0
         assert paid["probes"] == 7.0
@@ -35,7 +36,7 @@ def test_who_finds_a_bake_pays_what_its_maker_paid():
 
 
 def test_training_views_cost_what_rendering_those_that_were_handed_out_took():
-    paid = preparation(1.0, {"training": 0.75}, [], [], views(True, False, True))
+    paid = preparation(1.0, {"training": 0.75}, [], [], [views(True, False, True)])
     assert paid["references"] == 40.0
     assert paid["training"] == 0.75
     assert paid["other"] == 0.25
@@ -44,13 +45,13 @@ def test_training_views_cost_what_rendering_those_that_were_handed_out_took():
 
 
 def test_time_counts_once_where_a_stage_holds_the_making_of_its_bake():
-    paid = preparation(6.0, {"lightmap": 5.5}, [LIGHTMAP], [LIGHTMAP], views())
+    paid = preparation(6.0, {"lightmap": 5.5}, [LIGHTMAP], [LIGHTMAP], [views()])
     assert paid["lightmap"] == pytest.approx(5.5)
     assert paid["seconds"] == pytest.approx(6.0)
 
 
 def test_what_no_name_is_known_for_is_other():
-    paid = preparation(3.0, {"sorting": 1.0}, [Bake("tables", Path("c"), 4.0, 8)], [], views())
+    paid = preparation(3.0, {"sorting": 1.0}, [Bake("tables", Path("c"), 4.0, 8)], [], [views()])
     assert paid["other"] == pytest.approx(7.0)
     assert paid["seconds"] == pytest.approx(7.0)
 

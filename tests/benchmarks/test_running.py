@@ -18,9 +18,10 @@ import pytest
 
 from gibench.benchmarks import machine, running
 from gibench.benchmarks.errors import Interrupted, ResultsError, RunError, TrackError
+from gibench.benchmarks.orders import ordered_methods
 from gibench.benchmarks.result_files import RunFolder, key_of
 from gibench.benchmarks.results import load
-from gibench.benchmarks.running import ordered_methods, run
+from gibench.benchmarks.running import run
 from gibench.benchmarks.track import check_track
 from gibench.datasets.errors import FolderError
 from gibench.datasets.verifying import verify

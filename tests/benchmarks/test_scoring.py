@@ -38,7 +38,7 @@ def stack(frames, part: str = "full") -> np.ndarray:
 
 def test_frame_by_frame_is_what_the_metrics_say_of_the_whole_path(scene):
     pred, exposure = noisy(scene), 0.7
-    new = compute(pred, scene, ["rmse", "dssim"], SEQUENCE, exposure)
+    new = compute(pred, scene, ["rmse", "dssim"], SEQUENCE, [exposure] * 3)
     reference = {part: stack(lambda f: reference_parts(scene, f), part) for part in ("full", "specular")}
     for part, ref in reference.items():
         row = metrics.evaluate(
@@ -56,15 +56,17 @@ def test_frame_by_frame_is_what_the_metrics_say_of_the_whole_path(scene):
         )
         for name, value in whole.items():
             if name != "exposure":
-                assert new["sequences"][part][name] == pytest.approx(value, rel=1e-12), name
+                assert new["sequences"][part]["walk"][name] == pytest.approx(value, rel=1e-12), name
     assert visible.any()
 
 
 def test_the_reference_itself_has_no_error(scene):
-    new = compute(lambda f: reference_parts(scene, f), scene, ["rmse", "dssim"], ["temporal_difference"], 1.0)
+    new = compute(
+        lambda f: reference_parts(scene, f), scene, ["rmse", "dssim"], ["temporal_difference"], [1.0] * 3
+    )
     for part in ("full", "specular"):
         assert new["frames"][part] == {"rmse": [0, 0, 0], "dssim": [0, 0, 0]}
-        assert new["sequences"][part]["temporal_difference"] == 0
+        assert new["sequences"][part]["walk"]["temporal_difference"] == 0
 
 
 def test_the_two_renderings_are_independent_and_agree_on_what_is_seen(scene):
@@ -94,7 +96,8 @@ def test_the_noise_floor_is_the_distance_of_one_rendering_to_the_mean(scene, res
 
 def test_all_frames_share_the_exposure_of_the_references(results, scene):
     whole = stack(lambda f: reference_parts(scene, f))
-    assert results.exposure("room-000000") == metrics.reference_exposure(whole, shared=True)
+    shared = metrics.reference_exposure(whole, shared=True)
+    assert [results.exposure("room-000000", frame) for frame in range(3)] == [shared] * 3
     label = results.results.set_index("label")["result"]
     id = label["constant shade=1"]
     frames = results.frames
@@ -107,7 +110,7 @@ def test_all_frames_share_the_exposure_of_the_references(results, scene):
         ]["value"].item()
         reference = reference_parts(scene, 2)[part]
         shown = [
-            metrics.tone_map(image, results.exposure("room-000000"))
+            metrics.tone_map(image, results.exposure("room-000000", 2))
             for image in (np.full_like(reference, shade), reference)
         ]
         assert value == pytest.approx(

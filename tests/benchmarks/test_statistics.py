@@ -50,7 +50,7 @@ def fake(errors: dict[str, float], *, noise: float = 0.01, seeds=(0,), machines=
         skipped={},
         results=pd.DataFrame(rows),
         frames=pd.DataFrame(frames, columns=["result", "frame", "ms", "metric", "part", "value"]),
-        sequences=pd.DataFrame(columns=["result", "metric", "part", "value"]),
+        sequences=pd.DataFrame(columns=["result", "sequence", "metric", "part", "value"]),
         floor=pd.DataFrame(
             [(f"room-{r}", f, name, "full", noise) for r in range(ROOMS) for f in range(FRAMES)],
             columns=["scene", "frame", "metric", "part", "value"],

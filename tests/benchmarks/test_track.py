@@ -4,7 +4,7 @@ import math
 import pytest
 
 from gibench.benchmarks.errors import TrackError
-from gibench.benchmarks.track import SCORED, check_track, load_track, track_names
+from gibench.benchmarks.track import CHANNELS_OF, MOVING, check_track, load_track, track_names
 from gibench.generators.rooms import sample_room
 from gibench.rendering.render import MAX_DEPTH
 from tests.benchmarks.conftest import TINY
@@ -24,7 +24,7 @@ def test_the_presets_of_the_walkthrough_are_what_the_issue_asks_for():
     assert min(smoke.recipe("reference").resolution) >= 31  # what LPIPS needs
     assert cpu.rooms >= 4
     assert cpu.recipe("reference").resolution == (320, 180)
-    assert cpu.path_frames >= 24
+    assert cpu.room["path_views"] >= 24
     assert paper.recipe("reference").resolution == (1920, 1080)
     for preset in (smoke, cpu, paper):
         training, reference = preset.recipe("training"), preset.recipe("reference")
@@ -34,7 +34,7 @@ def test_the_presets_of_the_walkthrough_are_what_the_issue_asks_for():
         again = preset.recipe("reference-again")
         assert again.sample_seed != reference.sample_seed
         assert again.model_copy(update={"sample_seed": reference.sample_seed}) == reference
-        assert set(SCORED) <= set(reference.channels)
+        assert {*MOVING, *(c for part in track.parts for c in CHANNELS_OF[part])} <= set(reference.channels)
         # Methods trace as far as gibench does where it is not told; nothing may ask for more.
         assert reference.max_depth == training.max_depth == MAX_DEPTH
 
@@ -68,7 +68,10 @@ def test_training_views_and_references_are_of_the_same_rooms_and_no_frame_is_bot
         (lambda t, p: p.update(rooms=0), r"presets\.tiny\.rooms"),
         (lambda t, p: p["budget"].update(render=-1), r"presets\.tiny\.budget\.render"),
         (lambda t, p: p["budget"].update(render=math.nan), r"presets\.tiny\.budget\.render"),
-        (lambda t, p: p["room"].pop("path_views"), "preset tiny: room: path_views is missing"),
+        (
+            lambda t, p: p["room"].pop("path_views"),
+            "preset tiny: room: path_views, held_out, sequences are missing",
+        ),
         (lambda t, p: p["room"].update(path="stills"), "preset tiny: reference: path_views needs a path"),
         (lambda t, p: p["room"].update(kinds=["barn"]), "preset tiny: reference: kinds: no kind 'barn'"),
         (lambda t, p: p["training"].update(spq=3), "preset tiny: training: unknown key 'spq'"),

@@ -17,6 +17,7 @@ from gibench.generators.rooms import sample_room
 from gibench.generators.scene_files import write_room
 from gibench.rendering.backend import select_variant
 from gibench.rendering.camera import PinholeCamera
+from gibench.rendering.lighting import Shot
 from gibench.rendering.scene import load_scene
 
 pytestmark = pytest.mark.performance
@@ -75,7 +76,9 @@ def test_milliseconds_a_frame(room, method, knobs):
         if frame == 2:  # two that compile and record
             stages = Stages()
         start = time.perf_counter()
-        implementation.render(View(cameras[frame % len(cameras)], None, RESOLUTION, frame, frame), stages)
+        implementation.render(
+            View(Shot(cameras[frame % len(cameras)]), None, RESOLUTION, frame, frame), stages
+        )
         times.append(time.perf_counter() - start)
     parts = ", ".join(f"{name} {1e3 * seconds / FRAMES:.0f}" for name, seconds in stages.seconds.items())
     print(f"\n{method.id}: {1e3 * statistics.median(times[2:]):.0f} ms a frame ({parts})")

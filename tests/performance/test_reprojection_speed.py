@@ -16,6 +16,7 @@ from gibench.generators.rooms import sample_room
 from gibench.generators.scene_files import write_room
 from gibench.rendering.backend import select_variant
 from gibench.rendering.camera import PinholeCamera
+from gibench.rendering.lighting import Shot
 from gibench.rendering.scene import load_scene
 
 pytestmark = pytest.mark.performance
@@ -41,7 +42,9 @@ def test_the_search_and_the_gather_on_the_same_frames(tmp_path):
         for frame in range(FRAMES + 2):
             if frame == 2:  # two that compile and record
                 stages = Stages()
-            implementation.render(View(cameras[frame % len(cameras)], None, RESOLUTION, frame, frame), stages)
+            implementation.render(
+                View(Shot(cameras[frame % len(cameras)]), None, RESOLUTION, frame, frame), stages
+            )
         seconds[method.id] = {name: 1e3 * spent / FRAMES for name, spent in stages.seconds.items()}
     search = seconds["elp-search"]["search"]
     both = seconds["gpr"]["gather"] + seconds["gpr"]["filter"]

@@ -148,7 +148,7 @@ def test_parts_and_metrics_that_become_files_are_refused_too(run, part):
     for changed in (
         {"frames": {part: scores["frames"]["full"]}},
         {"frames": {"full": {part: [0.1, 0.1, 0.1]}}},
-        {"sequences": {"full": {part: 0.1}}},
+        {"sequences": {"full": {"walk": {part: 0.1}}}},
     ):
         path.write_bytes(as_json({**scores, **changed}))
         with pytest.raises(ResultsError, match=f"{path.name} is damaged"):

@@ -91,6 +91,7 @@ def baked_lightmap(site: Site, settings: Mapping[str, Setting]) -> Lightmap:
         "texels_per_metre": settings["texels"],
         "spp": settings["lightmap_spp"],
         "denoise": settings["lightmap_denoise"],
+        "max_depth": site.max_depth,
     }
 
     def make(folder: Path) -> None:
@@ -99,6 +100,7 @@ def baked_lightmap(site: Site, settings: Mapping[str, Setting]) -> Lightmap:
             texels_per_metre=chosen["texels_per_metre"],
             spp=chosen["spp"],
             denoise=chosen["denoise"],
+            max_depth=chosen["max_depth"],
         )
         write_lightmap(folder, baked.atlas, baked.unwrapping.corners, baked.unwrapping.offsets)
 

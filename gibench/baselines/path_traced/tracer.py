@@ -22,7 +22,6 @@ from gibench.baselines.replay import Replay, camera_arrays, ray_generator
 from gibench.baselines.stages import Stages
 from gibench.rendering.denoise import denoise
 from gibench.rendering.integrator import trace_paths
-from gibench.rendering.render import MAX_DEPTH
 from gibench.rendering.sampling import IndependentSampler
 from gibench.rendering.scene import Scene
 
@@ -33,7 +32,9 @@ GUIDES = ("albedo", "normal")
 IMAGES = ("emission", "diffuse", "specular", *GUIDES)
 
 
-def trace_rows(scene: Scene, camera, seed, first, width, pixels: int, spp: int) -> dict[str, Any]:
+def trace_rows(
+    scene: Scene, max_depth: int, camera, seed, first, width, pixels: int, spp: int
+) -> dict[str, Any]:
     """IMAGES of rows of a frame, each mi.Color3f of `pixels` lanes. first: row. pixels, spp: how many."""
     # Independent samples: strata make frames that are denoised no better, and each size of them is a kernel.
     sampler = IndependentSampler()
@@ -46,7 +47,7 @@ def trace_rows(scene: Scene, camera, seed, first, width, pixels: int, spp: int) 
         scene.mi_scene,
         sampler,
         ray_generator(camera).rays(corner + sampler.next_2d()),
-        max_depth=MAX_DEPTH,
+        max_depth=max_depth,
         guides=True,
         portals=scene.portals,
         layers=scene.layers,
@@ -82,7 +83,7 @@ class PathTracer:
 
     def prepare(self, site: Site) -> None:
         """Keep the scene."""
-        self._kernel = Replay(site.scene, partial(trace_rows, site.scene))
+        self._kernel = Replay(site.scene, partial(trace_rows, site.scene, site.max_depth))
 
     def render(self, view: View, stages: Stages) -> Prediction:
         """Trace, then denoise the image as a whole, as a renderer shows it, and the specular part once more.

@@ -18,7 +18,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from gibench.baselines.method import Setting, Site
+from gibench.baselines.method import MAX_DEPTH, Setting, Site
 from gibench.baselines.probes import placement
 from gibench.baselines.probes.adaptive.parameterization import CELLS, GUIDE_MAPS, GUIDES, parameterize
 from gibench.baselines.probes.adaptive.warp import Warp
@@ -31,7 +31,6 @@ from gibench.rendering import surface
 from gibench.rendering.denoise import denoise
 from gibench.rendering.gbuffer import Hit
 from gibench.rendering.integrator import scatter_paths
-from gibench.rendering.render import MAX_DEPTH
 from gibench.rendering.sampling import IndependentSampler
 from gibench.rendering.scene import Scene
 
@@ -129,14 +128,17 @@ class _Baker:
         scene: Scene,
         positions: NDArray[np.float32],
         settings: ProbeSettings,
-        *,
         materials: NarrowedMaterials | None = None,
         warp: Warp | None = None,
+        *,
+        max_depth: int = MAX_DEPTH,
     ) -> None:
         """positions: (N, 3), metres.
 
-        materials: of the first hits, where they are not the scene's own. warp: of adaptive probes.
+        materials: of the first hits, where they are not the scene's own. warp: of adaptive probes. max_depth:
+        scattering events of a path.
         """
+        self.max_depth = max_depth
         self.scene, self.settings, self.count = scene, settings, len(positions)
         self.materials, self.warp = materials, warp
         self.held = [thing.arrays for thing in (materials, warp) if thing is not None]
@@ -187,7 +189,7 @@ class _Baker:
             si,
             si.bsdf(ray) if narrowed is None else narrowed.at(si),
             mi.Bool(True),
-            max_depth=MAX_DEPTH,
+            max_depth=self.max_depth,
             lobes=lobes,
             portals=self.scene.portals,
             layers=(self.scene if narrowed is None else narrowed).layers,
@@ -352,14 +354,14 @@ def baked_files(site: Site, settings: ProbeSettings, maps: tuple[str, ...]) -> d
     for part in dict.fromkeys(MAPS[name][0] for name in maps):
         chosen = {**mapped, "part": part}
         if part in (RADIANCE, LIGHT):
-            chosen |= {"spp": settings.spp, "denoise": settings.denoise, "max_depth": MAX_DEPTH}
+            chosen |= {"spp": settings.spp, "denoise": settings.denoise, "max_depth": site.max_depth}
             if settings.first_roughness != 1:
                 chosen["first_roughness"] = settings.first_roughness
 
         def make(folder: Path, part: str = part, files: dict[str, Path] = files) -> None:
             narrowed = _first_materials(site, settings) if part == RADIANCE else None
             warp = load_warp(settings, files)
-            baker = _Baker(site.scene, np.load(where), settings, materials=narrowed, warp=warp)
+            baker = _Baker(site.scene, np.load(where), settings, narrowed, warp, max_depth=site.max_depth)
             if part in (RADIANCE, LIGHT):
                 _bake_radiance(baker, part, folder)
             else:

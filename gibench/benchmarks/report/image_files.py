@@ -84,7 +84,7 @@ def write_images(source: ReportSource, results: pd.DataFrame, out: Path) -> int:
 
     def write(job: tuple[Any, Any]) -> int:
         (scene, frame, part), predictions = job
-        exposure = source.exposure(scene)
+        exposure = source.exposure(scene, int(frame))
         reference = source.reference(scene, int(frame), part)
         seen = tone_map(reference, exposure)
         total = _write(out, image_name("images", scene, frame, part), encode(reference * exposure))

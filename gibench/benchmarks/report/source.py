@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 PREPARATION = ("lightmap", "probes", "references", "training")
 """What preparation is booked as; the columns are prepare_<name>_s."""
 
-PARTS = {"full": "Full image", "specular": "Specular part"}
+PARTS = {"full": "Full image", "indirect": "Indirect light", "specular": "Specular part"}
 """What is scored of an image, and how a reader is told."""
 
 
@@ -68,5 +68,5 @@ class ReportSource(Protocol):
     def reference(self, scene: str, frame: int, part: str) -> NDArray[np.float32]:
         """What is right, (H, W, 3), linear radiance."""
 
-    def exposure(self, scene: str) -> float:
-        """The factor from radiance to display values of a scene's path."""
+    def exposure(self, scene: str, frame: int) -> float:
+        """The factor from radiance to display values of a frame of a scene."""

@@ -14,6 +14,7 @@ from gibench.baselines.nearest_probe import METHOD as NEAREST
 from gibench.baselines.probes import placement
 from gibench.baselines.stages import Stages
 from gibench.rendering.camera import PinholeCamera
+from gibench.rendering.lighting import Shot
 from gibench.rendering.render import render_frame
 from gibench.rendering.scene import load_dict
 from tests.baselines.efficient_light_probes.test_implementation import CAMERA, SMALL, mirror_floor
@@ -165,7 +166,7 @@ def test_two_steps_make_the_roughness_of_one(tmp_path):
 
     def error(**given):
         implementation.adjust(GPR.settings(SMALL | knobs | given))
-        found = implementation.render(View(CAMERA, None, size, 0, 0), Stages()).specular
+        found = implementation.render(View(Shot(CAMERA), None, size, 0, 0), Stages()).specular
         return np.sqrt(np.mean((np.minimum(found, 1) - expected) ** 2))
 
     assert error() < 0.85 * error(filter=False)
@@ -176,7 +177,7 @@ def test_the_frame_before_stands_in_where_no_probe_has_a_sample(mirror, monkeypa
     before = adjusted(mirror, CHEAP)
     gather = mirror.kernels["gather"]
     monkeypatch.setitem(mirror.kernels, "gather", lambda *arguments: _nothing(gather(*arguments)))
-    following = View(CAMERA, CAMERA, RESOLUTION, 1, 0)
+    following = View(Shot(CAMERA), Shot(CAMERA), RESOLUTION, 1, 0)
     again = mirror.render(following, Stages())
     np.testing.assert_allclose(again.specular, before.specular, atol=1e-4)
     alone = mirror.render(view(CAMERA), Stages())

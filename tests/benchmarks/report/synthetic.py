@@ -198,19 +198,19 @@ class SyntheticRun:
             self.paint(setting, scene, frame, part),
             self.reference(scene, frame, part),
             metrics=self.metrics,
-            exposure=self.exposure(scene),
+            exposure=self.exposure(scene, frame),
         )
         return {name: found[name] for name in self.metrics}
 
     @cached_property
     def sequences(self):
         rows = [
-            (row.result, "warping_error", part, 0.01 + 0.05 * self.of[row.result][0].noise)
+            (row.result, "walk", "warping_error", part, 0.01 + 0.05 * self.of[row.result][0].noise)
             for row in self.done
             for part in self.parts
             if part == "full" or self.of[row.result][0].specular
         ]
-        return pd.DataFrame(rows, columns=["result", "metric", "part", "value"])
+        return pd.DataFrame(rows, columns=["result", "sequence", "metric", "part", "value"])
 
     @cached_property
     def floor(self):
@@ -223,7 +223,7 @@ class SyntheticRun:
         ]
         return pd.DataFrame(rows, columns=["scene", "frame", "metric", "part", "value"])
 
-    def exposure(self, scene):
+    def exposure(self, scene, frame):
         return float(reference_exposure(self.reference(scene, self.indices[0], "full")))
 
     def reference(self, scene, frame, part):

@@ -69,7 +69,7 @@ def test_files_hold_the_image_its_reference_and_the_flip_map(run, page_file):
     root = page_file.parent
     done = run.frames.iloc[-1]
     _, scene = run.of[done.result]
-    exposure = run.exposure(scene)
+    exposure = run.exposure(scene, 0)
     reference = run.reference(scene, done.frame, done.part)
     image = run.prediction(done.result, done.frame, done.part)
     expected = {

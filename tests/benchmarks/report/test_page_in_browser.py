@@ -177,7 +177,7 @@ def test_an_image_is_what_was_stored_under_the_exposure_that_is_set(opened, run)
     page = opened()
     look_at_images(page)
     left = "#split .layer:not(.over) canvas"
-    reference = run.reference("room-000000", 0, "full") * run.exposure("room-000000")
+    reference = run.reference("room-000000", 0, "full") * run.exposure("room-000000", 0)
     for stops in ("0", "2", "-3.25"):
         page.locator("#exposure").fill(stops)
         page.locator("#split").scroll_into_view_if_needed()
@@ -205,7 +205,7 @@ def test_error_maps_have_a_scale_and_its_colours(opened, run):
     ]["result"]
     page.select_option("#right", label="lightmap")
     shown(page, "#split .over canvas", image_name("errors", result, 0, "full"))
-    exposure = run.exposure("room-000000")
+    exposure = run.exposure("room-000000", 0)
     pair = (run.prediction(result, 0, "full"), run.reference("room-000000", 0, "full"))
     error = np.rint(255 * flip(*(tone_map(image, exposure) for image in pair), map=True))
     for top in ("1", "0.25"):

@@ -1,14 +1,30 @@
 """Training views are charged when they are handed out, whatever process reads them."""
 
+from pathlib import Path
+
 import pytest
 from torch.utils.data import DataLoader, Dataset
 
-from gibench.benchmarks.scenes import training_views
+from gibench.baselines.bakes import BakeCache
+from gibench.baselines.training_set import training_set
+from gibench.datasets.making import make
+from gibench.datasets.recipes import check_recipe
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory) -> Path:
+    """A dataset of two frames."""
+    root = tmp_path_factory.mktemp("training") / "views"
+    recipe = check_recipe(
+        {"rooms": 1, "seed": 4, "kinds": ["living"], "views": 2, "resolution": [20, 14], "spp": 2}
+    )
+    make(root, recipe)
+    return root
 
 
 @pytest.fixture
-def views(made):
-    found = training_views(made[0] / "scenes" / "training", 0)
+def views(dataset):
+    found = training_set(dataset, 0)
     assert len(found) == 2
     assert found.handed_out == []
     assert found.seconds == 0
@@ -61,8 +77,38 @@ def test_tensors_are_charged(views, workers):
 
 
 def test_a_run_without_views():
-    nothing = training_views(None, 0)
+    nothing = training_set(None, 0)
     assert list(nothing) == []
     assert nothing.seconds == 0
     with pytest.raises(IndexError):
         nothing[0]
+
+
+def test_asking_for_the_hash_costs_nothing_and_tells_sets_apart(dataset, views):
+    assert views.sha256 == training_set(dataset).sha256
+    assert views.sha256 != training_set(dataset, 1).sha256
+    assert views.rooms == (0,)
+    assert len(views.frames) == 2
+    assert views.handed_out == []
+
+
+def test_some_frames_as_tensors(views):
+    items = views.torch(["albedo"], [1])
+    assert len(items) == 1
+    assert views.handed_out == []
+    assert items[0]["albedo"].shape == (3, 14, 20)
+    assert views.handed_out == [1]
+
+
+def test_who_finds_weights_pays_for_the_views_that_they_were_trained_on(dataset, views, tmp_path):
+    def learn(folder):
+        views[1]
+        (folder / "weights").write_text("1")
+
+    views[0]
+    BakeCache(tmp_path, "scene", {}, views).get("training", {}, learn)
+    assert views.handed_out == [0, 1]
+
+    later = training_set(dataset, 0)
+    BakeCache(tmp_path, "scene", {}, later).get("training", {}, learn)
+    assert later.handed_out == [1]

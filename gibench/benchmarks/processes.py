@@ -1,0 +1,64 @@
+"""Worker processes, as the process that starts them sees them."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import time
+from contextlib import suppress
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+from gibench.benchmarks import worker
+
+#: Seconds that a process which takes too long is given to say where it is.
+LAST_WORDS = 1.0
+
+
+class Process:
+    """A worker process, gone when the context is left."""
+
+    def __init__(self, task: worker.Task) -> None:
+        """It starts when the context is entered."""
+        self.task = task
+
+    def __enter__(self) -> Process:
+        context = multiprocessing.get_context("spawn")
+        ours, theirs = context.Pipe()
+        self.connection: Connection = ours
+        self.process = context.Process(target=worker.work, args=(theirs, self.task), daemon=True)
+        self.process.start()
+        theirs.close()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.process.kill()
+        self.process.join()
+        self.connection.close()
+
+    def heard(self, limit: float) -> tuple[str, Any]:
+        """The next message; ("lost", reason and traceback) where the process dies or takes over `limit` seconds."""
+        if not self.connection.poll(limit):
+            with suppress(OSError):
+                os.kill(self.process.pid or 0, signal.SIGUSR1)
+            time.sleep(LAST_WORDS)
+            reason = f"it took more than {limit:g} s, the track's limit"
+            return "lost", {"reason": reason, "traceback": log_tail(self.task.log)}
+        try:
+            return tuple(self.connection.recv())
+        except (EOFError, OSError):
+            self.process.join()
+            code = self.process.exitcode or 0
+            how = f"killed by {signal.Signals(-code).name}" if code < 0 else f"ended with code {code}"
+            hint = " (out of memory?)" if code == -signal.SIGKILL else ""
+            reason = f"its process was {how}{hint}" if code < 0 else f"its process {how}"
+            return "lost", {"reason": reason, "traceback": log_tail(self.task.log)}
+
+
+def log_tail(log: Path, characters: int = 4000) -> str:
+    """The end of what a process wrote to the terminal."""
+    with suppress(OSError):
+        return log.read_text(encoding="utf-8", errors="replace")[-characters:]
+    return ""
