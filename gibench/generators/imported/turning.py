@@ -1,4 +1,4 @@
-"""Meshes turned round in their files rather than by a flag.
+"""Meshes written anew: turned round in their files rather than by a flag, or without some of their faces.
 
 Mitsuba merges meshes of one material when it loads a scene, and refuses to where they differ in `flip_normals`.
 """
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from gibench.generators.imported.files import destinations
 from gibench.generators.imported.scene import ImportedScene
 from gibench.generators.imported.tree import Node, copied, new
+from gibench.generators.opened import without_faces
 from gibench.generators.parts import FloatArray, Mesh
 from gibench.generators.scene_files import ply_bytes
 
@@ -33,17 +34,33 @@ def with_meshes_turned(scene: ImportedScene, turned: Mapping[str, NDArray[np.boo
     return _baked(scene, turned)
 
 
+def with_faces_removed(scene: ImportedScene, gone: Mapping[str, NDArray[np.bool_]]) -> ImportedScene:
+    """The scene without faces of shapes; a shape without any left is gone.
+
+    gone: by shape id, (faces,) which of them; (1,) for a shape that is no mesh.
+    """
+    return _baked(scene, {name: np.zeros(1, dtype=bool) for name in gone}, gone)
+
+
 def _is_flipped(node: Node) -> bool:
     return node.value("flip_normals") == "true"
 
 
-def _baked(scene: ImportedScene, turned: Mapping[str, NDArray[np.bool_]]) -> ImportedScene:
+def _baked(
+    scene: ImportedScene,
+    turned: Mapping[str, NDArray[np.bool_]],
+    removed: Mapping[str, NDArray[np.bool_]] | None = None,
+) -> ImportedScene:
     root = copied(scene.tree.root)
     tree = replace(scene.tree, root=root, made=dict(scene.tree.made))
     nodes = {node.get("id", ""): node for node in root.nodes("shape")}
     shapes = {shape.id(): shape for shape in scene.loaded.mi_scene.shapes()}
     for name, faces in turned.items():
         node, shape = nodes[name], shapes[name]
+        without = (removed or {}).get(name, np.zeros(1, dtype=bool))
+        if without.all():
+            root.remove(node)
+            continue
         flipped = faces != _is_flipped(node)
         for gone in [part for part in node.nodes() if part.get("name") == "flip_normals"]:
             node.remove(gone)
@@ -54,6 +71,11 @@ def _baked(scene: ImportedScene, turned: Mapping[str, NDArray[np.bool_]]) -> Imp
         mesh, rows = _mesh(shape, flipped)
         of_vertices, of_faces = _attributes(shape)
         of_vertices = {kind: values[rows] for kind, values in of_vertices.items()}
+        if without.any():
+            kept_vertices = np.unique(mesh.faces[~without])
+            of_vertices = {kind: values[kept_vertices] for kind, values in of_vertices.items()}
+            of_faces = {kind: values[~without] for kind, values in of_faces.items()}
+            mesh = without_faces(mesh, without)
         content = ply_bytes(mesh, vertex_attributes=of_vertices, face_attributes=of_faces)
         file = tree.make(name, ".turned.ply", content)
         # What is left of it: its materials, its light, and whether its faces are flat.
