@@ -5,6 +5,7 @@ from __future__ import annotations
 import mitsuba as mi
 import numpy as np
 import pytest
+from scipy.fft import dctn
 from scipy.ndimage import gaussian_filter
 
 from gibench.baselines.probes import placement
@@ -141,6 +142,27 @@ def test_complexity_is_that_of_the_definition():
         assert found[row, column] == pytest.approx(total, rel=1e-4)
 
 
+def test_normals_that_are_alike_are_not_complex_whatever_rounds_them():
+    rng = np.random.default_rng(0)
+    for normal in [(0.0, 0.0, 1.0), (0.6, 0.0, -0.8), *rng.normal(size=(6, 3))]:
+        flat = np.tile(np.array(normal, dtype=np.float32) / np.float32(np.linalg.norm(normal)), (40, 64, 1))
+        np.testing.assert_array_equal(complexity(flat), 0)
+        # As an interpolated normal comes out of a renderer: off by a unit in the last place, up or down.
+        rounded = np.nextafter(flat, np.where(rng.random(flat.shape) < 0.5, -2, 2).astype(np.float32))
+        np.testing.assert_array_equal(complexity(rounded), 0)
+    np.testing.assert_array_equal(complexity(np.zeros((40, 64, 3))), 0)
+
+
+@pytest.mark.parametrize(("turn", "tolerance"), [(1e-2, 0.01), (1e-3, 0.03), (1e-4, 0.3)])
+def test_normals_that_hardly_turn_still_count(turn, tolerance):
+    """Radians a texel, against a transform in double precision: what is taken for rounding is little of it."""
+    angle = turn * np.arange(64)
+    normal = np.tile(np.stack([np.sin(angle), 0 * angle, np.cos(angle)], axis=-1), (40, 1, 1))
+    responses = np.abs(dctn(normal[:SIDE, 24 : 24 + SIDE], axes=(0, 1), norm="ortho")).sum(axis=-1)
+    weight = np.hypot(*np.indices((SIDE, SIDE))) ** 5 / SIDE**2
+    assert complexity(normal)[20, 32] == pytest.approx((weight * responses).sum(), rel=tolerance)
+
+
 def flat_room(rows=32, columns=64):
     """Guides of a place where everything is alike."""
     return (
@@ -180,6 +202,7 @@ def test_guides_that_are_extreme():
     smooth, distance, normal, facing = flat_room()
     for guides in (
         (0 * smooth, distance, normal, facing),  # nothing glossy
+        (1e-7 * np.random.default_rng(0).random(smooth.shape), distance, normal, facing),  # nothing but dust
         (smooth, 0 * distance, 0 * normal, 0 * facing),  # nothing at all
     ):
         np.testing.assert_array_equal(resolution_map(*guides), 1)

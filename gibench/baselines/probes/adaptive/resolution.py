@@ -17,6 +17,14 @@ BAND = 16
 EXPONENT = 5
 """k in section 4.2.1: how much more high frequencies count."""
 
+LEAST_RESPONSE = 1e-5
+"""Of a frequency, below which there is nothing: a constant has 16 at frequency 0, of which rounding leaves 1e-6 at the
+others and two units in the last place of the normals 2e-6, more or less by the processor. The weights of the
+frequencies, half a million together, would make a map of that where normals vary nowhere."""
+
+LEAST_SMOOTHNESS = 1e-3
+"""Below which a surface is diffuse: roughness is stored in half precision, which has steps of half of it below 1."""
+
 BLUR = 5.0
 """Standard deviation of the last blur in texels, section 4.2.1."""
 
@@ -42,6 +50,7 @@ def resolution_map(
     elevation = np.pi * (0.5 - (np.arange(height) + 0.5) / height)
     size = np.square(distance.astype(np.float64)) / np.maximum(facing, LEAST_FACING)
     size *= np.cos(elevation)[:, None]
+    smoothness = np.where(smoothness < LEAST_SMOOTHNESS, 0, smoothness)
     wanted = smoothness * (_by_mean(size) + _by_mean(complexity(normal)))
     wanted = gaussian_filter1d(wanted, BLUR, axis=1, mode="wrap")
     wanted = gaussian_filter1d(wanted, BLUR, axis=0, mode="nearest")
@@ -52,8 +61,9 @@ def resolution_map(
 def complexity(normal: NDArray[np.floating]) -> NDArray[np.float64]:
     """How much normals vary around each texel, (H, W) ≥ 0, relative: high frequencies of a cosine transform count most.
 
-    normal: (H, W, 3), of a lat-long map. The map goes on over its left and right edge; beyond its top and bottom it
-    repeats the last row. A neighbourhood is as large at a pole as elsewhere.
+    normal: (H, W, 3) unit, 0 on a miss, of a lat-long map; where they are alike it is exactly 0. The map goes on over
+    its left and right edge; beyond its top and bottom it repeats the last row. A neighbourhood is as large at a pole
+    as elsewhere.
     """
     height, width = normal.shape[:2]
     basis = dct(np.eye(SIDE), axis=0, norm="ortho").astype(np.float32)  # a frequency a row
@@ -74,6 +84,7 @@ def complexity(normal: NDArray[np.floating]) -> NDArray[np.float64]:
             below = across[top : top + rows + SIDE - 1]
             response = band[:rows, :, : len(below)].reshape(-1, len(below)) @ below
             response = np.abs(response).reshape(rows, SIDE, width, SIDE)
+            response[response < LEAST_RESPONSE] = 0
             response *= weight.astype(np.float32)[:, None]
             total[top : top + rows] += response.sum(axis=(1, 3))
     return total
