@@ -5,9 +5,20 @@ from __future__ import annotations
 import os
 import signal
 
+import pytest
+
+from tests import blas
+
 # Read when torch is loaded: threads that wait asleep, since those that spin starve whatever else runs.
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 # A shell that runs the tests in the background has Ctrl-C ignored, by them and by all that they start.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        elsewhere = any(item.get_closest_marker(name) for name in ("performance", "stress"))
+        if not elsewhere and blas.is_numerical(item.path):
+            item.add_marker("blas")
