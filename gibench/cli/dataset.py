@@ -88,10 +88,12 @@ def make(
     ] = False,
 ) -> None:
     """Make a dataset of furnished rooms or of scenes, or continue or extend the one that the folder holds."""
+    from gibench.datasets.pool import MOST_WORKERS
+
     if preset is not None and recipe is not None:
         raise _usage("--preset and --recipe exclude each other: keep one of them")
-    if workers < 1:
-        raise _usage(f"--workers: {workers} is not allowed; allowed is an integer from 1")
+    if not 1 <= workers <= MOST_WORKERS:
+        raise _usage(f"--workers: {workers} is not allowed; allowed is an integer from 1 to {MOST_WORKERS}")
     if scene and (rooms is not None or kind is not None):
         raise _usage("--scene takes the place of rooms: leave out --rooms and --kind")
     if cameras is not None and views is None:

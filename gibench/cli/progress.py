@@ -43,6 +43,7 @@ def making() -> Iterator[Callable[[Making], None]]:
 
         def tell(now: Making) -> None:
             nonlocal said
+            _remark(console, now)
             if time.monotonic() - said >= QUIET_SECONDS:
                 said = time.monotonic()
                 console.print(
@@ -64,6 +65,7 @@ def making() -> Iterator[Callable[[Making], None]]:
         task = bar.add_task("", total=None, counts="starting", speed="")
 
         def show(now: Making) -> None:
+            _remark(console, now)
             bar.update(
                 task,
                 total=now.frames,
@@ -73,6 +75,12 @@ def making() -> Iterator[Callable[[Making], None]]:
             )
 
         yield show
+
+
+def _remark(console: Console, now: Making) -> None:
+    """Print what has not been printed yet."""
+    while now.remarks:
+        console.print(now.remarks.pop(0), soft_wrap=True, markup=False, highlight=False)
 
 
 def _counts(now: Making) -> str:

@@ -27,7 +27,7 @@ class Progress:
     """How far a run is. rooms, frames: of the whole dataset; before: what was whole when the run began.
 
     paths: camera paths traced by this run. kernel_seconds: time in the renderer, summed over workers.
-    rejected_rooms: number → reason.
+    rejected_rooms: number → reason. remarks: what happened that the user should know of, a line each.
     """
 
     rooms: int
@@ -40,6 +40,7 @@ class Progress:
     kernel_seconds: float = 0.0
     rejected_views: int = 0
     rejected_rooms: dict[int, str] = field(default_factory=dict)
+    remarks: list[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -85,8 +86,8 @@ def make(
     Raises `FolderError`, `RecipeError` before anything is made; `MakingError` and `Interrupted` half-way,
     when what is whole is in the table and the same call continues.
     """
-    if workers < 1:
-        raise MakingError(f"{workers} workers cannot make anything: ask for 1 or more")
+    if not 1 <= workers <= pool.MOST_WORKERS:
+        raise MakingError(f"{workers} workers are not possible: ask for 1 to {pool.MOST_WORKERS}")
     started = time.perf_counter()
     work = work or pool.Work(Renderer(variant, default_threads(workers), recipe), RoomMaker(root, recipe))
     with folder.claimed(root):
@@ -155,7 +156,7 @@ class _Run:
     def do(self, work: pool.Work, workers: int) -> None:
         self.on_progress(self.progress)
         if self.rooms:
-            listener = pool.Listener(self._ready, self._message, self._done, self._died)
+            listener = pool.Listener(self._ready, self._message, self._done, self._died, self._told)
             pool.run_rooms(work, self.rooms, listener, workers=min(workers, len(self.rooms)))
 
     def _ready(self, facts: dict[str, Any]) -> None:
@@ -191,6 +192,10 @@ class _Run:
     def _died(self, room: int) -> None:
         self.progress.frames_done -= self.frames_of.pop(room, 0)
         folder.remove_partials(self.root, room)
+
+    def _told(self, remark: str) -> None:
+        self.progress.remarks.append(f"{remark}; once more in a new worker")
+        self.on_progress(self.progress)
 
     def finish(self, started: float) -> None:
         """Gather what is whole. Nothing is touched where the dataset was complete before."""

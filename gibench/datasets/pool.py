@@ -13,10 +13,11 @@ import multiprocessing
 import os
 import signal
 import threading
+import time
 import traceback
 from collections import deque
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any
@@ -26,6 +27,23 @@ from gibench.errors import GibenchError
 
 #: Rooms after which a worker makes way for a fresh one.
 ROOMS_PER_WORKER = 25
+
+#: Most workers at the same time; each holds a renderer and some hundred megabytes.
+MOST_WORKERS = 1024
+
+#: A worker is given up that neither says anything nor computes for so many seconds: it was stopped, or waits for what
+#: never comes.
+PATIENCE = 60.0
+
+#: One that computes and says nothing is given up after this many times the longest silence so far, but not before so
+#: many seconds: the samples of a frame may differ by a factor of 64 where an error is asked for.
+SILENCES, COMPUTING_PATIENCE = 100, 1800.0
+
+#: Stands for the start of a worker among the rooms that one has died in.
+HANGING_START = -1
+
+#: Seconds between two looks at workers that say nothing, and of processor time that count as computing.
+LOOK_SECONDS, COMPUTING = 2.0, 0.01
 
 #: Sends a message from a job to the process that hands out rooms: (kind of message, content).
 Report = Callable[[str, Any], None]
@@ -51,6 +69,7 @@ class Listener:
     message: Callable[[int, str, Any], None]
     done: Callable[[int, Any], None]
     died: Callable[[int], None]
+    told: Callable[[str], None] = lambda text: None
 
 
 @dataclass
@@ -60,18 +79,28 @@ class _Worker:
     room: int | None = None
     ready: bool = False
     rooms_left: int = ROOMS_PER_WORKER
+    heard: float = field(default_factory=time.monotonic)
+    computed: float = field(default_factory=time.monotonic)
+    seconds: float = 0.0
+    hung: str = ""
+
+    @property
+    def busy(self) -> bool:
+        """Whether something is awaited of it."""
+        return not self.ready or self.room is not None
 
 
 def run_rooms(work: Work, rooms: Iterable[int], listener: Listener, *, workers: int = 1) -> None:
     """Do every room, in up to `workers` processes at a time; returns when all are done.
 
-    A room whose worker dies is tried once more in a fresh one. Raises `MakingError` when it dies again, and
+    A room whose worker dies or hangs is tried once more in a fresh one. Raises `MakingError` when it does again, and
     for whatever a job raises (a `GibenchError` keeps its message); a `RecipeError` of the setup stays one. All workers
     are gone when this returns or raises.
     """
     left = deque(rooms)
     deaths: set[int] = set()
     crew: list[_Worker] = []
+    watch = _Watch()
     try:
         while left or any(worker.room is not None for worker in crew):
             idle = sum(worker.room is None for worker in crew)
@@ -81,16 +110,23 @@ def run_rooms(work: Work, rooms: Iterable[int], listener: Listener, *, workers: 
             for worker in crew:
                 if worker.ready and worker.room is None and left:
                     worker.room = left.popleft()
+                    worker.heard = worker.computed = time.monotonic()
                     with contextlib.suppress(OSError):  # it has just died, and is heard of below
                         worker.connection.send(worker.room)
-            wait([worker.connection for worker in crew])
-            for worker in [w for w in crew if w.connection.poll()]:
+            wait([worker.connection for worker in crew], timeout=LOOK_SECONDS)
+            watch.look(crew)
+            for worker in [w for w in crew if w.hung or w.connection.poll()]:
                 try:
+                    if worker.hung:
+                        worker.process.kill()
+                        listener.told(_place(worker) + worker.hung)
+                        raise EOFError
                     kind, content = worker.connection.recv()
                 except (EOFError, OSError):
                     crew.remove(worker)
                     left.extendleft(_room_of_the_dead(worker, deaths, listener))
                     continue
+                watch.heard(worker)
                 if _heard(worker, kind, content, listener):
                     crew.remove(worker)
     finally:
@@ -99,6 +135,58 @@ def run_rooms(work: Work, rooms: Iterable[int], listener: Listener, *, workers: 
         for worker in crew:
             worker.process.join()
             worker.connection.close()
+
+
+class _Watch:
+    """Notices workers that hang: stopped, or waiting for what never comes."""
+
+    def __init__(self) -> None:
+        self.longest = 0.0
+        self.looked = time.monotonic()
+
+    def heard(self, worker: _Worker) -> None:
+        now = time.monotonic()
+        # What the setup takes, which loads a renderer, says nothing about rooms.
+        if worker.ready and worker.room is not None:
+            self.longest = max(self.longest, now - worker.heard)
+        worker.heard = worker.computed = now
+
+    def look(self, crew: list[_Worker]) -> None:
+        now = time.monotonic()
+        if now - self.looked < LOOK_SECONDS:
+            return
+        if now - self.looked > 5 * LOOK_SECONDS:  # this process was stopped itself, and so, likely, were they
+            for worker in crew:
+                worker.heard = worker.computed = now
+        self.looked = now
+        for worker in crew:
+            seconds = _processor_seconds(worker.process)
+            if seconds is None or seconds - worker.seconds > COMPUTING or not worker.busy:
+                worker.computed, worker.seconds = now, seconds or worker.seconds
+            limit = max(COMPUTING_PATIENCE, SILENCES * self.longest) if self.longest else float("inf")
+            if not worker.busy or worker.connection.poll():
+                continue
+            if now - worker.heard > limit:
+                worker.hung = (
+                    f"said nothing for {now - worker.heard:.0f} s, {SILENCES} times as long as ever before"
+                )
+            elif now - worker.computed > PATIENCE:
+                worker.hung = f"hangs: it has not computed anything for {now - worker.computed:.0f} s"
+
+
+def _processor_seconds(process: BaseProcess) -> float | None:
+    """Processor time of a process so far; None where that cannot be known, or it has ended."""
+    import psutil
+
+    try:
+        times = psutil.Process(process.pid).cpu_times()
+    except psutil.Error:
+        return None
+    return float(times.user + times.system)
+
+
+def _place(worker: _Worker) -> str:
+    return "a worker " if worker.room is None else f"room {worker.room}: its worker "
 
 
 def _heard(worker: _Worker, kind: str, content: Any, listener: Listener) -> bool:
@@ -130,6 +218,11 @@ def _room_of_the_dead(worker: _Worker, deaths: set[int], listener: Listener) -> 
     worker.process.join()
     code = worker.process.exitcode or 0
     how = f"killed by {signal.Signals(-code).name}" if code < 0 else f"ended with code {code}"
+    if worker.hung:
+        how = "given up, since each hung"
+        if not worker.ready and HANGING_START not in deaths:
+            deaths.add(HANGING_START)
+            return []
     if not worker.ready:
         raise MakingError(
             f"a worker was {how} before its first room: `gibench doctor` shows whether rendering works"

@@ -9,7 +9,7 @@ class MetricInputError(GibenchError, ValueError):
     """An argument that no metric can be computed from; the base of the errors below."""
 
 
-class DtypeError(GibenchError, TypeError):
+class DtypeError(MetricInputError, TypeError):
     """An array whose type says nothing about its range, such as 8-bit integers."""
 
 

@@ -12,11 +12,14 @@ from gibench.metrics.flip import PIXELS_PER_DEGREE, flip_filters, flip_map
 from gibench.metrics.inputs import FloatArray, Mask, MetricValue, each_frame, frame_mask, linear_pair
 from gibench.metrics.pixelwise import Float64, masked_mean, outside_is_nan
 from gibench.metrics.registry import register
-from gibench.metrics.tone_map import DARKEST_LIT, LUMINANCE
+from gibench.metrics.tone_map import LUMINANCE, lit_luminance
 
 ACES_NUMERATOR = (0.6 * 0.6 * 2.51, 0.6 * 0.03, 0.0)
 ACES_DENOMINATOR = (0.6 * 0.6 * 2.43, 0.6 * 0.59, 0.14)
 """Coefficients of x², x and 1 in Narkowicz's fit to the ACES curve; 0.6 takes back its built-in exposure."""
+
+SATURATED = 1e6
+"""Exposed radiance from which the curve is 1 to the last bit, however far it goes on."""
 
 BRIGHT = 0.85
 """Display value that the ends of the exposure range bring to the brightest and the median luminance
@@ -93,8 +96,8 @@ def hdrflip(
 def exposure_range(ref: FloatArray) -> ExposureRange:
     """Find the exposures for one reference (Andersson et al. 2021, section 4).
 
-    Where half of the reference is black, the median of its lit pixels stands in for the median, which would
-    ask for an infinite exposure. A black reference is looked at as it is, at 0 stops.
+    Where half of the reference is black, or as good as that (`lit_luminance`), the median of its lit pixels stands in
+    for the median, which would ask for an infinite exposure. A black reference is looked at as it is, at 0 stops.
 
     Args:
         ref: linear radiance, (H, W, 3), finite and not negative.
@@ -103,13 +106,13 @@ def exposure_range(ref: FloatArray) -> ExposureRange:
         The range; at least two exposures unless both ends are the same.
     """
     luminance = ref @ LUMINANCE
-    lit = luminance[luminance >= DARKEST_LIT]
+    lit = lit_luminance(luminance)
     if not lit.size:
         return ExposureRange(0.0, 0.0, 1)
     # The upper one of the two middle values where their number is even, as NVIDIA's implementation takes it.
     middle = luminance.size // 2
     median = float(np.partition(luminance, middle, axis=None)[middle])
-    if median < DARKEST_LIT:
+    if median < lit.min():
         median = float(np.median(lit))
     start, stop = (math.log2(_BRIGHT_INPUT / value) for value in (float(lit.max()), median))
     return ExposureRange(start, stop, 1 if start == stop else max(2, math.ceil(stop - start)))
@@ -117,7 +120,8 @@ def exposure_range(ref: FloatArray) -> ExposureRange:
 
 def aces(radiance: Float64, stops: float) -> Float64:
     """Expose radiance, apply Narkowicz's fit to the ACES curve, and clip to [0, 1]; linear, of any shape."""
-    x = radiance * 2.0**stops
+    with np.errstate(over="ignore"):
+        x = np.minimum(radiance * 2.0**stops, SATURATED)
     a, b, c = ACES_NUMERATOR
     d, e, f = ACES_DENOMINATOR
     return np.clip(((a * x + b) * x + c) / ((d * x + e) * x + f), 0, 1)

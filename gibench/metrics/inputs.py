@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,6 +23,9 @@ MetricValue = float | NDArray[np.float64]
 
 Measure = Callable[[FloatArray, FloatArray, Mask | None], MetricValue]
 
+LARGEST = 1e300
+"""Largest radiance in float64: the sum over the pixels of any image is still a number."""
+
 AXES = ("frame", "row", "column", "channel")
 
 
@@ -40,7 +44,7 @@ def linear_pair(pred: ArrayLike, ref: ArrayLike) -> tuple[FloatArray, FloatArray
     """
     pair = _pair(pred, ref)
     for name, image in (("pred", pair[0]), ("ref", pair[1])):
-        check_range(name, image, np.inf, "radiance is never negative: clamp where the method makes it")
+        check_radiance(name, image)
     return pair
 
 
@@ -76,7 +80,7 @@ def frame_mask(mask: ArrayLike | None, image: FloatArray, batched: bool) -> Mask
     """
     if mask is None:
         return None
-    array = np.asarray(mask)
+    array = plain_array("mask", mask)
     if array.dtype != np.bool_:
         raise DtypeError(f"mask must be boolean, not {array.dtype}: compare it with something first")
     expected = image.shape[:3] if batched else image.shape[1:3]
@@ -86,20 +90,62 @@ def frame_mask(mask: ArrayLike | None, image: FloatArray, batched: bool) -> Mask
 
 
 def float_array(name: str, value: ArrayLike) -> FloatArray:
-    """Give an array of float32 or float64; half floats become float32.
+    """Give an array of float32 or float64 of this machine's byte order; half floats become float32.
 
     Raises:
-        DtypeError: for anything but real floating-point numbers.
+        DtypeError: for anything but real floating-point numbers, and for what `plain_array` refuses.
     """
-    array = np.asarray(value)
-    if array.dtype == np.float16:
-        return array.astype(np.float32)
-    if array.dtype in (np.float32, np.float64):
-        return array
+    array = plain_array(name, value)
+    if array.dtype.kind == "f" and array.dtype.itemsize in (2, 4, 8):
+        native = array.dtype.newbyteorder("=")
+        return array.astype(np.float32 if native == np.float16 else native, copy=False)
     raise DtypeError(
         f"{name} must be float16, float32 or float64, not {array.dtype}: integers carry no range, "
         "so convert them (8-bit images: divide by 255)"
     )
+
+
+def plain_array(name: str, value: Any) -> NDArray[Any]:
+    """Give an array of whatever says that it is one, and lose nothing on the way.
+
+    Raises:
+        DtypeError: for masked arrays with masked values, lists of rows of different lengths, and tensors that another
+            library has to turn into arrays first.
+    """
+    if _has_masked(value):
+        raise DtypeError(
+            f"{name} is a masked array, whose mask would be lost: give its data, and mask=~{name}.mask.any(-1) for "
+            "the pixels that count"
+        )
+    try:
+        array = np.asarray(value)
+    except Exception as problem:  # whatever a library says that will not be read
+        reason = " ".join(str(problem).split())[:200]
+        raise DtypeError(
+            f"{name} cannot be read as an array ({reason}): rows must have one length; a tensor of torch "
+            "needs .detach().cpu().float(), a sparse one .to_dense() before"
+        ) from None
+    return array
+
+
+def _has_masked(value: Any) -> bool:
+    if isinstance(value, list | tuple):
+        return any(map(_has_masked, value))
+    return isinstance(value, np.ma.MaskedArray) and bool(np.ma.getmaskarray(value).any())
+
+
+def check_radiance(name: str, image: FloatArray) -> None:
+    """Let pass radiance: finite, not negative, and so far from the largest number that a sum of it has one.
+
+    Raises:
+        NonFiniteError, RangeError: for other values.
+    """
+    check_range(name, image, np.inf, "radiance is never negative: clamp where the method makes it")
+    if image.dtype == np.float64 and (highest := image.max()) > LARGEST:
+        raise RangeError(
+            f"{name} has values up to {highest:g}, of which a float64 holds no sum: divide by a unit in which they are "
+            f"below {LARGEST:g}"
+        )
 
 
 def check_range(name: str, array: FloatArray, upper: float, advice: str) -> None:

@@ -19,6 +19,9 @@ EPSILON = 0.01
 """What Rousselle et al. 2011 add to the squared reference, and Vogels et al. 2018 to the sum of both values, so that
 near-black pixels do not decide the mean."""
 
+SMALLEST, LARGEST = 1e-140, 1e140
+"""Radiance between which squares keep their digits, and sums of them are numbers."""
+
 
 def squared_error(pred: Float64, ref: Float64) -> Float64:
     """Square the difference of each value."""
@@ -34,6 +37,9 @@ def absolute_error(pred: Float64, ref: Float64) -> Float64:
 def relative_squared_error(pred: Float64, ref: Float64) -> Float64:
     """Divide each squared difference by the squared reference."""
     difference = pred - ref
+    if max(ref.max(initial=0.0), pred.max(initial=0.0)) > LARGEST:
+        ratio = difference / np.hypot(ref, math.sqrt(EPSILON))
+        return ratio * ratio
     return difference * difference / (ref * ref + EPSILON)
 
 
@@ -114,7 +120,15 @@ def rmse(pred: ArrayLike, ref: ArrayLike, *, map: bool = False, mask: ArrayLike 
         Wang & Bovik 2009, Mean squared error: love it or leave it?, IEEE Signal Processing Magazine 26(1).
     """
     squared = linear_error(squared_error, pred, ref, map=map, mask=mask)
-    return np.sqrt(squared) if isinstance(squared, np.ndarray) else math.sqrt(squared)
+    scale = 1.0
+    first, second = np.asarray(pred), np.asarray(ref)
+    largest = float(max(first.max(), second.max()))
+    if not SMALLEST < largest < LARGEST and largest > 0:
+        # The squares are beyond the numbers that there are, and their root is not. A power of 2 changes no digit.
+        scale = 2.0 ** math.frexp(largest)[1]
+        first, second = first.astype(np.float64) / scale, second.astype(np.float64) / scale
+        squared = linear_error(squared_error, first, second, map=map, mask=mask)
+    return scale * np.sqrt(squared) if isinstance(squared, np.ndarray) else scale * math.sqrt(squared)
 
 
 @register(

@@ -78,12 +78,20 @@ def cache_folder() -> Path:
     if chosen := os.environ.get("GIBENCH_CACHE"):
         root = Path(chosen)
     elif sys.platform == "win32":
-        root = Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local")) / "gibench"
+        root = Path(os.environ.get("LOCALAPPDATA") or _home() / "AppData" / "Local") / "gibench"
     elif sys.platform == "darwin":
-        root = Path.home() / "Library" / "Caches" / "gibench"
+        root = _home() / "Library" / "Caches" / "gibench"
     else:
-        root = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "gibench"
+        root = Path(os.environ.get("XDG_CACHE_HOME") or _home() / ".cache") / "gibench"
     return root / f"{PACKAGE}-{VERSION}"
+
+
+def _home() -> Path:
+    """The user's folder; a temporary one for users without, as containers have them."""
+    try:
+        return Path.home()
+    except RuntimeError:
+        return Path(tempfile.gettempdir()) / f"gibench-{os.getuid()}"
 
 
 def weights_state() -> WeightsState:

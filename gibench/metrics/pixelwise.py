@@ -51,12 +51,18 @@ def mean_error(error: ErrorFunction, pred: FloatArray, ref: FloatArray, mask: Ma
         pred, ref = pred[mask], ref[mask]
         if not pred.size:
             return empty_mask()
-    return math.fsum(float(error(p, r).sum()) for p, r in _blocks(pred, ref)) / pred.size
+    with np.errstate(over="ignore"):  # an error beyond the largest number is infinite, and says so
+        sums = [float(error(p, r).sum()) for p, r in _blocks(pred, ref)]
+    try:
+        return math.fsum(sums) / pred.size
+    except OverflowError:
+        return math.inf
 
 
 def error_map(error: ErrorFunction, pred: FloatArray, ref: FloatArray, mask: Mask | None) -> Float64:
     """Give the error of each pixel of one frame, averaged over its channels: (H, W), NaN outside the mask."""
-    blocks = [error(p, r).mean(axis=-1) for p, r in _blocks(pred, ref)]
+    with np.errstate(over="ignore"):
+        blocks = [error(p, r).mean(axis=-1) for p, r in _blocks(pred, ref)]
     return outside_is_nan(np.concatenate(blocks).reshape(pred.shape[:2]), mask)
 
 

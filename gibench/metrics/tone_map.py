@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gibench.metrics.errors import RangeError, ShapeError
-from gibench.metrics.inputs import FloatArray, check_range, float_array
+from gibench.metrics.inputs import FloatArray, check_radiance, float_array
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 """Luminance of linear Rec. 709 RGB (ITU-R BT.709-6, item 3.2)."""
@@ -21,6 +21,15 @@ value of Reinhard et al. 2002 (Photographic tone reproduction for digital images
 
 DARKEST_LIT = float(np.finfo(np.float32).tiny)
 """Luminance below which a pixel counts as unlit; from here on an exposure is finite in float32 too."""
+
+DUST = 2.0**-30
+"""Share of the brightest luminance of a frame below which a pixel counts as unlit too. Denoising and sampling leave
+values like 1e-12 where nothing is lit; the sun seen from a dim room is 2²⁷ times as bright as the room."""
+
+
+def lit_luminance(luminance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Give those of some luminances that count as lit: at least `DARKEST_LIT`, and `DUST` times the brightest."""
+    return luminance[luminance >= max(DARKEST_LIT, DUST * float(luminance.max(initial=0.0)))]
 
 
 def reference_exposure(ref: ArrayLike, *, shared: bool = False) -> float | NDArray[np.float64]:
@@ -78,9 +87,12 @@ def tone_map(radiance: ArrayLike, exposure: ArrayLike) -> FloatArray:
         raise ShapeError(f"exposure has shape {factor.shape} for an image of shape {image.shape}")
     if not (np.isfinite(factor).all() and (factor > 0).all()):
         raise RangeError(f"exposure must be positive and finite, not {factor}")
-    factor = factor.astype(image.dtype)
+    limits = np.finfo(image.dtype)
+    # An exposure beyond the image's own type would be infinite or 0 there.
+    wide = np.float64 if ((factor < limits.tiny) | (factor > limits.max)).any() else image.dtype
+    factor = (factor[:, None, None, None] if factor.ndim else factor).astype(wide)
     with np.errstate(over="ignore"):  # what overflows is far above 1, where the curve clips
-        exposed = np.minimum(image * (factor[:, None, None, None] if factor.ndim else factor), 1)
+        exposed = np.minimum(image.astype(wide, copy=False) * factor, 1).astype(image.dtype, copy=False)
     return srgb_from_linear(exposed)
 
 
@@ -101,11 +113,10 @@ def _radiance(name: str, value: ArrayLike) -> FloatArray:
     image = float_array(name, value)
     if image.ndim not in (3, 4) or image.shape[-1] != 3 or image.size == 0:
         raise ShapeError(f"{name} must be (H, W, 3) or (N, H, W, 3) with pixels in it, not {image.shape}")
-    check_range(name, image, np.inf, "radiance is never negative: clamp where the method makes it")
+    check_radiance(name, image)
     return image
 
 
 def _exposure(image: FloatArray) -> float:
-    luminance = image @ LUMINANCE
-    lit = luminance[luminance >= DARKEST_LIT]
+    lit = lit_luminance(image @ LUMINANCE)
     return float(MIDDLE_GREY / np.median(lit)) if lit.size else 1.0
