@@ -19,9 +19,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from gibench import gate
 from gibench.baselines.sources import digest, module_of
 from gibench.baselines.stages import synchronise
 from gibench.baselines.training_set import TrainingSet
+from gibench.datasets.checked import Amount, Checked, Count, parsed
 from gibench.datasets.files import as_json, sync_tree
 from gibench.datasets.folder import own_leftovers
 
@@ -88,9 +90,10 @@ class BakeCache:
         }
         name = hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()[:24]
         folder = self.root / f"{kind}-{name}"
-        if not (folder / RECORD).is_file():
+        record = _whole(folder, key, self._views)
+        if record is None:
             _make(folder, key, make, self._views)
-        record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
+            record = parsed(gate.read_regular(folder / RECORD), BakeRecord)
         bake = Bake(kind, folder, record["seconds"], record["bytes"])
         self._views.book(record["views"])
         if bake.folder not in [used.folder for used in self.used]:
@@ -106,6 +109,33 @@ class BakeCache:
         return folder.with_name(f"{folder.name.partition(PARTIAL)[0]}.checkpoint")
 
 
+class BakeRecord(Checked):
+    """`bake.json`."""
+
+    key: dict[str, Any]
+    seconds: Amount
+    bytes: Count
+    views: list[Count]
+
+
+def _whole(folder: Path, key: Mapping[str, Any], views: TrainingSet) -> dict[str, Any] | None:
+    """The record of a bake of this key whose files have the size that was written; None where it must be made anew."""
+    if not gate.real_folder(folder):
+        return None
+    try:
+        record = parsed(gate.read_inside(folder, RECORD), BakeRecord)
+    except (gate.GateError, ValueError):
+        return None
+    whole = record["key"] == json.loads(json.dumps(key)) and record["bytes"] == _size(folder)
+    return record if whole and all(number < len(views) for number in record["views"]) else None
+
+
+def _size(folder: Path) -> int:
+    """Bytes of the files of a bake, its record apart."""
+    files = (path for path in folder.rglob("*") if path.is_file() and path != folder / RECORD)
+    return sum(path.stat().st_size for path in files)
+
+
 def _make(
     folder: Path, key: dict[str, Any], make: Callable[[Path], float | None], views: TrainingSet
 ) -> None:
@@ -116,18 +146,18 @@ def _make(
             before = make(partial) or 0.0
         synchronise()
         seconds = before + time.perf_counter() - start
-        size = sum(path.stat().st_size for path in partial.rglob("*") if path.is_file())
+        size = _size(partial)
         (partial / RECORD).write_bytes(
             as_json({"key": key, "seconds": seconds, "bytes": size, "views": handed_out})
         )
         sync_tree(partial)
-        if folder.exists() and not (folder / RECORD).is_file():
+        if folder.exists() and _whole(folder, key, views) is None:
             shutil.rmtree(folder)
         try:
             partial.rename(folder)
         except OSError as problem:
             # Another process has made the same in the meantime, and somebody may be reading it.
-            if problem.errno not in (errno.EEXIST, errno.ENOTEMPTY) or not (folder / RECORD).is_file():
+            if problem.errno not in (errno.EEXIST, errno.ENOTEMPTY) or _whole(folder, key, views) is None:
                 raise
         BakeCache.checkpoint(partial).unlink(missing_ok=True)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -71,6 +72,7 @@ class Run:
         self.started = time.perf_counter()
         self.began = datetime.now(UTC)
         self.run: dict[str, Any] = {}
+        self.before: list[dict[str, Any]] = []
         self.scenes: list[SceneFiles] = []
         self.facts: dict[str, Any] = {}
         self.machine = ""
@@ -148,7 +150,8 @@ class Run:
             "machine": {**self.facts, "id": self.machine},
             "machines": {**self.run.get("machines", {}), self.machine: self.facts},
         }
-        self.folder.write_run(self.run)
+        self.before = list(self.run["runs"])
+        self.keep_record(ended=False)
 
     def _make(self, which: Any) -> None:
         order = self.order
@@ -350,21 +353,27 @@ class Run:
 
     def finish(self, ids: Sequence[str]) -> Report:
         """Write down what was done and what it took."""
+        seconds = self.keep_record(ended=True)
+        return Report(tuple(ids), len(self.made), tuple(self.failed), seconds)
+
+    def keep_record(self, *, ended: bool) -> dict[str, float]:
+        """Write down what this command has done so far, and return its seconds. A killed one leaves that it began."""
         total = time.perf_counter() - self.started
         seconds = {"total": total, **self.spent, "harness": max(0.0, total - sum(self.spent.values()))}
-        self.run["runs"] = [
-            *self.run["runs"],
-            {
-                "command": self.order.command,
-                "began": self.began.isoformat(timespec="seconds"),
-                "machine": self.machine,
-                "made": len(self.made),
-                "failed": len(self.failed),
-                "seconds": seconds,
-            },
-        ]
+        if not self.facts:
+            return seconds
+        record = {
+            "command": self.order.command,
+            "began": self.began.isoformat(timespec="seconds"),
+            "ended": ended,
+            "machine": self.machine,
+            "made": len(self.made),
+            "failed": len(self.failed),
+            "seconds": seconds,
+        }
+        self.run["runs"] = [*self.before, record]
         self.folder.write_run(self.run)
-        return Report(tuple(ids), len(self.made), tuple(self.failed), seconds)
+        return seconds
 
 
 def run(
@@ -400,10 +409,14 @@ def run(
                 doing.spent["score"] += time.perf_counter() - began
             return doing.finish([job.id for job in jobs])
         except KeyboardInterrupt:
+            with suppress(OSError):
+                doing.keep_record(ended=False)
             done = f"{doing.state.done} of {doing.state.of} results" if doing.state.of else "no result"
             again = f"to continue run `{order.command}`" if order.command else "the same call continues"
             raise Interrupted(f"stopped with {done} there; {again}") from None
         except OSError as problem:
+            with suppress(OSError):
+                doing.keep_record(ended=False)
             raise RunError(_why(root, problem)) from None
 
 

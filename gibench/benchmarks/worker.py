@@ -21,6 +21,7 @@ import hashlib
 import io
 import math
 import os
+import shutil
 import signal
 import sys
 import threading
@@ -53,6 +54,9 @@ METHOD_LANE = 2000
 
 #: Stands for the number of the room in the random numbers of a training on all rooms.
 ROOMS = 2**31
+
+#: Bytes left on a disk from which it counts as full: a failure with less cannot be told from one that is the disk's.
+FULL = 16 * 2**20
 
 
 @dataclass(frozen=True)
@@ -105,13 +109,28 @@ def work(connection: Connection, task: Task) -> None:
         connection.send(("done", None))
     except Exception as problem:
         sys.stdout.flush()
-        if isinstance(problem, OSError) and problem.errno in (errno.ENOSPC, errno.EDQUOT):
-            connection.send(("storage", problem.filename or ""))
+        if disk_refused(problem, task.bakes):
+            connection.send(("storage", getattr(problem, "filename", None) or ""))
             return
         text = " ".join(str(problem).split())
         reason = text if isinstance(problem, GibenchError) else f"{type(problem).__name__}: {text}"
         with suppress(OSError):
             connection.send(("failed", {"reason": reason, "traceback": traceback.format_exc()}))
+
+
+def disk_refused(problem: BaseException, folder: Path) -> bool:
+    """Whether a failure is the disk's and none of the method's, so that it must not stay as a result.
+
+    Libraries wrap what the system says, or lose it and say that a file cannot be written: then the room that is left
+    decides. folder: where bakes go.
+    """
+    chain: BaseException | None = problem
+    while chain is not None:
+        if isinstance(chain, OSError) and chain.errno in (errno.ENOSPC, errno.EDQUOT):
+            return True
+        chain = chain.__cause__ or chain.__context__
+    there = next(place for place in (folder, *folder.parents) if place.exists())
+    return shutil.disk_usage(there).free < FULL
 
 
 class _Session:

@@ -132,6 +132,7 @@ class _Run:
         self.root, self.recipe, self.command, self.on_progress = root, recipe, command, on_progress
         self.manifest: dict[str, Any] | None = None
         self.began = datetime.now(UTC)
+        self.before: list[dict[str, Any]] | None = None
         if (root / folder.MANIFEST).exists():
             self.manifest = manifests.read_manifest(root)
             manifests.refuse_other(root, self.manifest, recipe)
@@ -171,6 +172,9 @@ class _Run:
             self.manifest["recipe"]["rooms"] = self.recipe.rooms
             self.manifest["command"] = self.command
             self.manifest["complete"] = False
+        if self.before is None:  # other workers of this run have nothing new to tell
+            self.before = list(self.manifest["runs"])
+            self.manifest["runs"] = [*self.before, self._record(time.perf_counter(), ended=False)]
             manifests.write_manifest(self.root, self.manifest)
 
     def _message(self, room: int, kind: str, content: dict[str, Any]) -> None:
@@ -197,13 +201,14 @@ class _Run:
         self.progress.remarks.append(f"{remark}; once more in a new worker")
         self.on_progress(self.progress)
 
-    def finish(self, started: float) -> None:
+    def finish(self, started: float, *, ended: bool = True) -> None:
         """Gather what is whole. Nothing is touched where the dataset was complete before."""
         assert self.manifest is not None
         if not self.rooms and self.manifest["complete"] and (self.root / folder.TABLE).exists():
             return
         rejected = {str(room): why for room, why in self.progress.rejected_rooms.items()}
-        runs = [*self.manifest["runs"], *([self._record(started)] if self.rooms else [])]
+        before = self.manifest["runs"] if self.before is None else self.before
+        runs = [*before, *([self._record(started, ended=ended)] if self.rooms else [])]
         manifest, table = manifests.gathered(
             self.root, {**self.manifest, "rejected_rooms": rejected, "runs": runs}
         )
@@ -220,12 +225,14 @@ class _Run:
             folder.remove_empty_dataset(self.root)
         elif self.manifest is not None:
             with contextlib.suppress(OSError):
-                self.finish(started)
+                self.finish(started, ended=False)
 
-    def _record(self, started: float) -> dict[str, Any]:
+    def _record(self, started: float, *, ended: bool) -> dict[str, Any]:
+        """What this run has done so far; one that is killed leaves that it began, and did not end."""
         return {
             "command": self.command,
             "began": self.began.isoformat(timespec="seconds"),
+            "ended": ended,
             "rooms": len(folder.whole_rooms(self.root)) - self.progress.rooms_before,
             "wall_seconds": time.perf_counter() - started,
             "kernel_seconds": self.progress.kernel_seconds,

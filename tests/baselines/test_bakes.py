@@ -95,9 +95,10 @@ def test_two_that_make_the_same_do_not_take_it_from_each_other(tmp_path):
         first = cache(tmp_path).root / name
         first.mkdir()
         make(first)
-        (first / RECORD).write_text(json.dumps({"key": {}, "seconds": 7.0, "bytes": 100}))
+        (first / RECORD).write_text(json.dumps({**record, "seconds": 7.0}))
 
     name = cache(tmp_path).get("lightmap", {}, make).folder.name
+    record = json.loads((tmp_path / "bakes" / name / RECORD).read_text())
     (tmp_path / "bakes" / name / RECORD).unlink()
     (tmp_path / "bakes" / name / "content").unlink()
     (tmp_path / "bakes" / name).rmdir()
@@ -167,3 +168,22 @@ def test_a_checkpoint_outlives_what_fails_and_goes_with_the_bake(tmp_path):
     bake = cache(tmp_path).get("training", {}, goes_on)
     assert 10.0 <= bake.seconds <= 10.0 + time.perf_counter() - start
     assert [path.name for path in (tmp_path / "bakes").iterdir()] == [bake.folder.name]
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda folder: (folder / RECORD).write_text("{"),
+        lambda folder: (folder / RECORD).write_text('{"key": {}, "seconds": 1.0, "bytes": 100, "views": []}'),
+        lambda folder: (folder / RECORD).write_text("[" * 10**5),
+        lambda folder: (folder / "content").write_bytes(b"x" * 50),
+        lambda folder: (folder / RECORD).unlink(),
+    ],
+)
+def test_a_bake_that_is_damaged_is_made_again(tmp_path, damage):
+    first = cache(tmp_path).get("lightmap", {"texels": 4}, make)
+    damage(first.folder)
+    again = cache(tmp_path).get("lightmap", {"texels": 4}, make)
+    assert (again.folder, again.size) == (first.folder, 100)
+    assert (again.folder / "content").read_bytes() == b"x" * 100
+    assert json.loads((again.folder / RECORD).read_text())["bytes"] == 100

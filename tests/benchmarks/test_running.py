@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gibench.benchmarks import machine, running
+from gibench.benchmarks import machine, running, worker
 from gibench.benchmarks.errors import Interrupted, ResultsError, RunError, TrackError
 from gibench.benchmarks.orders import ordered_methods
 from gibench.benchmarks.result_files import RunFolder, key_of
@@ -190,12 +190,28 @@ def test_a_method_that_hangs_is_stopped_and_says_where(scenes_only):
     assert "in render" in record["traceback"]
 
 
+def test_a_failure_that_is_the_disks_is_told_from_one_of_the_method(tmp_path, monkeypatch):
+    full = OSError(28, "No space left on device")
+    assert worker.disk_refused(full, tmp_path)
+    wrapped = RuntimeError("unexpected pos 64 vs 0")
+    wrapped.__context__ = full  # as torch does
+    assert worker.disk_refused(wrapped, tmp_path)
+    lost = RuntimeError("Failed to write pixel data to image file")
+    assert not worker.disk_refused(lost, tmp_path / "not" / "there")
+    monkeypatch.setattr(
+        worker.shutil, "disk_usage", lambda place: shutil._ntuple_diskusage(10**9, 10**9 - 4096, 4096)
+    )
+    assert worker.disk_refused(lost, tmp_path / "not" / "there")
+
+
 def test_a_full_disk_stops_the_run_and_leaves_no_half_files(scenes_only):
     with pytest.raises(RunError, match="the disk is full: free some space, then run the same command again"):
         run(scenes_only, order(toys.WRONG, overrides={"wrong": {"how": ("well", "disk")}}))
     folder = RunFolder(scenes_only)
     assert len(folder.ids()) == 1
     assert not list(scenes_only.rglob("*partial*"))
+    last = folder.read_run()["runs"][-1]
+    assert (last["ended"], last["made"]) == (False, 1)
 
 
 @pytest.mark.skipif(not hasattr(os, "killpg"), reason="needs process groups")

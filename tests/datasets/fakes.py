@@ -115,11 +115,12 @@ class Setup:
 
 @dataclass
 class Killed:
-    """A job whose process is killed in the middle of one room, the first `times` times."""
+    """A job whose process gets a signal in the middle of one room, the first `times` times."""
 
     job: RoomMaker
     room: int
     times: int
+    with_signal: int = signal.SIGKILL
 
     def __call__(self, room: int, report: Report) -> Any:
         tries = self.job.root.parent / "tries"
@@ -128,7 +129,7 @@ class Killed:
             tries.write_text("x" * (count + 1))
             if count < self.times:
                 (self.job.root / "rooms" / f".{room:06d}.partial-{os.getpid()}").mkdir(parents=True)
-                os.kill(os.getpid(), signal.SIGKILL)
+                os.kill(os.getpid(), self.with_signal)
         return self.job(room, report)
 
 
@@ -165,6 +166,14 @@ class Pids:
         if room:
             time.sleep(self.seconds)
         return os.getpid()
+
+
+@dataclass(frozen=True)
+class Asleep:
+    """A setup that waits for what never comes."""
+
+    def __call__(self) -> None:
+        time.sleep(600)
 
 
 @dataclass(frozen=True)

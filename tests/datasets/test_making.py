@@ -4,11 +4,13 @@ import errno
 import hashlib
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pandas as pd
 import pytest
@@ -18,8 +20,9 @@ from gibench.datasets.errors import FolderError, MakingError
 from gibench.datasets.loading import open_dataset
 from gibench.datasets.making import Progress, make
 from gibench.datasets.manifest import COLUMNS, read_manifest
+from gibench.datasets.room_making import RoomMaker
 from gibench.datasets.verifying import verify
-from tests.datasets.fakes import FACTS, Broken, Killed, Pids, Setup, fake_work, tiny
+from tests.datasets.fakes import FACTS, Asleep, Broken, Killed, Pids, Setup, fake_work, tiny
 
 
 def make_fake(root: Path, recipe=None, *, workers=1, work=None, **setup):
@@ -331,6 +334,58 @@ def test_ctrl_c_stops_tidily_and_says_how_to_continue(undisturbed, tmp_path):
     assert verify(root) == []
 
 
+@pytest.mark.parametrize("times", [1, 2])
+def test_a_worker_that_hangs_is_given_up(undisturbed, tmp_path, monkeypatch, times):
+    monkeypatch.setattr(pool, "PATIENCE", 1.5)
+    monkeypatch.setattr(pool, "LOOK_SECONDS", 0.2)
+    root, recipe = tmp_path / "d", tiny(4)
+    work = pool.Work(
+        Setup(), Killed(RoomMaker(root, recipe), room=2, times=times, with_signal=signal.SIGSTOP)
+    )
+    remarks = []
+
+    def note(progress: Progress) -> None:
+        while progress.remarks:
+            remarks.append(progress.remarks.pop())
+
+    if times == 2:
+        with pytest.raises(MakingError, match=r"room 2: two workers in a row were given up, since each hung"):
+            make(root, recipe, work=work, on_progress=note)
+        assert len(remarks) == 2
+    else:
+        make(root, recipe, work=work, on_progress=note)
+        assert len(remarks) == 1
+        assert frames_of(root) == frames_of(undisturbed)
+    assert re.match(r"room 2: its worker hangs: it has not computed anything for \d s; once more", remarks[0])
+    assert not list((root / "rooms").glob(".*"))
+
+
+def test_a_worker_that_hangs_before_its_first_room_is_replaced_once(monkeypatch):
+    monkeypatch.setattr(pool, "PATIENCE", 1.5)
+    monkeypatch.setattr(pool, "LOOK_SECONDS", 0.2)
+    told = []
+    listener = pool.Listener(
+        lambda facts: None, lambda *_: None, lambda *_: None, lambda room: None, told.append
+    )
+    with pytest.raises(MakingError, match="a worker was given up, since each hung before its first room"):
+        pool.run_rooms(pool.Work(Asleep(), Pids()), [0], listener)
+    assert len(told) == 2
+
+
+def test_a_process_that_was_stopped_itself_gives_nobody_up(monkeypatch):
+    """Ctrl-Z and `fg` an hour later: nobody has computed anything, and nobody hangs."""
+    monkeypatch.setattr(pool, "_processor_seconds", lambda process: 1.0)
+    now = [0.0]
+    monkeypatch.setattr(pool.time, "monotonic", lambda: now[0])
+    watch, worker = pool._Watch(), pool._Worker(None, SimpleNamespace(poll=lambda: False), room=3, ready=True)
+    for now[0] in (3.0, 3600.0, 3603.0):
+        watch.look([worker])
+    assert worker.hung == ""
+    for now[0] in range(3603, 3700, 3):
+        watch.look([worker])
+    assert worker.hung.startswith("hangs: it has not computed anything for")
+
+
 @pytest.mark.parametrize("delay", [0.0, 0.15])
 def test_a_kill_at_any_instant_is_survived(undisturbed, tmp_path, delay):
     root, process = started(tmp_path)
@@ -338,10 +393,12 @@ def test_a_kill_at_any_instant_is_survived(undisturbed, tmp_path, delay):
     time.sleep(delay)
     process.kill()  # the main process alone: workers must notice
     process.communicate(timeout=20)
+    assert [run["ended"] for run in read_manifest(root)["runs"]] == [False]
     make_fake(root, tiny(4))
     assert frames_of(root) == frames_of(undisturbed)
     assert verify(root) == []
     assert sorted(path.name for path in root.iterdir()) == sorted(path.name for path in undisturbed.iterdir())
+    assert [run["ended"] for run in read_manifest(root)["runs"]] == [False, True]
 
 
 def test_a_full_disk_leaves_what_is_whole_valid(tmp_path):
@@ -382,8 +439,9 @@ def test_the_process_that_hands_out_rooms_loads_no_renderer(tmp_path):
 
 
 def test_no_workers_are_no_way_to_make_anything(tmp_path):
-    with pytest.raises(MakingError, match="0 workers cannot make anything"):
-        make(tmp_path / "d", tiny(), workers=0)
+    for workers in (0, -1, 10**20):
+        with pytest.raises(MakingError, match=f"{workers} workers are not possible: ask for 1 to 1024"):
+            make(tmp_path / "d", tiny(), workers=workers)
     assert Setup()  # the fakes stay out of this process: the real modules must be untouched
     assert "fake" not in str(sys.modules.get("gibench.rendering.render"))
 

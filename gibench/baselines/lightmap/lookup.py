@@ -3,6 +3,7 @@
 # mypy: disable-error-code="no-untyped-def, misc"
 from __future__ import annotations
 
+import io
 from pathlib import Path
 from typing import Any
 
@@ -92,7 +93,9 @@ def write_lightmap(
     half = fits_half(atlas, dark=DARK * float(np.median(lit))) if lit.size else True
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     pixels = np.ascontiguousarray(atlas, dtype=np.float16 if half else np.float32)
-    OpenEXR.File(header, {"RGB": pixels}).write(str(folder / ATLAS))
+    content = io.BytesIO()  # OpenEXR says of a full disk only that something failed
+    OpenEXR.File(header, {"RGB": pixels}).write(content)
+    (folder / ATLAS).write_bytes(content.getvalue())
     np.save(folder / CORNERS, corners)
     np.save(folder / OFFSETS, offsets)
 

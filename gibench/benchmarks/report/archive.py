@@ -6,11 +6,14 @@ reads it after unpacking. The same report gives the same bytes.
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import os
 import re
 import shutil
+import struct
 import zipfile
+import zlib
 from pathlib import Path
 
 from gibench.benchmarks.report.source import ReportError
@@ -19,6 +22,17 @@ from gibench.datasets.files import sync_file, sync_tree
 SUMS = "SHA256SUMS"
 MOST_BYTES = 4 * 2**30
 """Of an archive unpacked; one that claims more is refused before anything is written."""
+
+DAMAGED = (
+    zipfile.BadZipFile,
+    zlib.error,
+    NotImplementedError,
+    EOFError,
+    RuntimeError,
+    ValueError,
+    struct.error,
+)
+"""What the reader of archives raises for those that are damaged, encrypted, or of another kind."""
 
 _LINE = re.compile(r"([0-9a-f]{64})  (.+)")
 _PIECE = 1 << 20
@@ -77,7 +91,14 @@ def unpack(file: Path, out: Path) -> Path:
         partial.rename(out)
     except FileNotFoundError:
         raise ReportError(f"there is no archive {file}") from None
-    except (zipfile.BadZipFile, NotImplementedError, EOFError) as problem:
+    except OSError as problem:
+        if problem.errno not in (
+            None,
+            errno.EINVAL,
+        ):  # what is not the disk's: a place before the begin, bad data
+            raise
+        raise ReportError(f"{file} is no archive of a report, or a damaged one") from None
+    except DAMAGED as problem:
         raise ReportError(f"{file} is no archive of a report, or a damaged one ({problem})") from None
     finally:
         shutil.rmtree(partial, ignore_errors=True)
