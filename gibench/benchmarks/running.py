@@ -21,7 +21,7 @@ from gibench.benchmarks.outcomes import Job
 from gibench.benchmarks.processes import Process
 from gibench.benchmarks.registry import Found
 from gibench.benchmarks.result_files import FORMAT, RunFolder, key_of
-from gibench.benchmarks.scenes import SceneFiles, scene_name, scenes_in
+from gibench.benchmarks.scenes import SceneFiles, refuse_files_outside, scene_name, scenes_in
 from gibench.benchmarks.settings import Choice, base_settings
 from gibench.datasets.making import Progress, make
 
@@ -94,6 +94,8 @@ class Run:
             self._make("training")
         self.spent["scenes"] += time.perf_counter() - began
         self.scenes = [s for s in scenes_in(*self.folder.references) if s.room < order.room_count]
+        for scene in self.scenes:
+            refuse_files_outside(self.folder.dataset("reference"), scene)
 
     def _identity(self) -> dict[str, Any]:
         """What all results of a folder have in common. Rooms may be added."""

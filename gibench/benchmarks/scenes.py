@@ -16,6 +16,7 @@ from functools import cache, cached_property
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from xml.etree import ElementTree
 
 from gibench import gate
 from gibench.benchmarks.errors import ResultsError
@@ -146,6 +147,24 @@ def scenes_in(root: Path, again: Path) -> list[SceneFiles]:
             )
         )
     return scenes
+
+
+def refuse_files_outside(root: Path, scene: SceneFiles) -> None:
+    """Check that a room's scene.xml names files of its own folder alone, before a renderer follows the names.
+
+    root: of the dataset. Raises ResultsError.
+    """
+    folder = scene.folder.relative_to(root)
+    try:
+        content = gate.read_inside(root, folder / "scene.xml")
+        for node in ElementTree.fromstring(content).iter():
+            if node.tag in ("include", "path"):
+                raise gate.GateError(f"it holds <{node.tag}>, which no room does")
+            named = [node.get("filename")] + [node.get("value")] * (node.get("name") == "filename")
+            for name in filter(None, named):
+                gate.inside(scene.folder, name)
+    except (gate.GateError, ElementTree.ParseError) as problem:
+        raise ResultsError(f"{scene.folder / 'scene.xml'} is not read: {problem}") from None
 
 
 def _inside(root: Path, file: str) -> Path:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gibench import gate
 from gibench.errors import GibenchError
 from gibench.rendering.backend import is_scalar, registry_key, select_variant, threads_to_load
 from gibench.rendering.kernel_sharing import spare_plugins
@@ -174,8 +175,8 @@ def _openings(file: Path) -> NDArray[np.float64] | None:
     if not file.is_file():
         return None
     try:
-        openings = np.array(json.loads(file.read_text(encoding="utf-8")), dtype=np.float64).reshape(-1, 3, 3)
-    except (ValueError, TypeError):
+        openings = np.array(json.loads(gate.read_regular(file)), dtype=np.float64).reshape(-1, 3, 3)
+    except (ValueError, TypeError, RecursionError, OverflowError):
         openings = np.full((1, 3, 3), np.nan)
     if not np.isfinite(openings).all():
         raise SceneError(

@@ -226,7 +226,7 @@ def _scenes(root: Path) -> None:
     Image.fromarray(np.zeros((4, 4, 3), np.uint8)).save(root / "picture.png")
     cameras = [
         {"origin": [0, -2, 1], "target": [0, 0, 1], "fov_degrees": 60},
-        {"to_world": np.eye(4).tolist(), "fov_degrees": 45},
+        {"matrix": np.eye(4).tolist(), "fov_degrees": 45},
     ]
     (root / "cameras.json").write_text(json.dumps(cameras))
 

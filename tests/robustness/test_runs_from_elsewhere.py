@@ -12,6 +12,7 @@ from gibench.benchmarks.errors import ResultsError
 from gibench.benchmarks.predictions import encode
 from gibench.benchmarks.result_files import RunFolder, key_of
 from gibench.benchmarks.results import load
+from gibench.benchmarks.scenes import refuse_files_outside, scenes_in
 from gibench.benchmarks.scoring import score
 from gibench.cli import run as command
 from gibench.cli.app import app
@@ -175,3 +176,29 @@ def test_scores_with_more_frames_than_the_path_are_damaged(run):
     path.write_bytes(as_json(scores))
     with pytest.raises(ResultsError, match=f"{path.name} is damaged .*9 values of rmse for 3 frames"):
         _ = load(run.root).frames
+
+
+SCENES = {
+    '<shape type="ply"><string name="filename" value="meshes/a.ply"/></shape>': "",
+    '<shape type="ply"><string name="filename" value="../../../../../../secret"/></shape>': "leads out of|No such",
+    '<texture type="bitmap"><string name="filename" value="/etc/hostname"/></texture>': "is no file of",
+    '<spectrum name="eta" filename="../secret"/>': "cannot be read|leads out of",
+    '<include filename="meshes/a.ply"/>': "it holds <include>",
+    '<path value="/"/>': "it holds <path>",
+    "<unclosed>": "mismatched tag",
+}
+
+
+@pytest.mark.parametrize("inner", SCENES)
+def test_scenes_of_a_run_name_files_of_their_own_folder_alone(run, inner):
+    root = run.dataset("reference")
+    (scene,) = scenes_in(*run.references)
+    (scene.folder / "meshes").mkdir()
+    (scene.folder / "meshes/a.ply").write_text("ply")
+    (run.root.parent / "secret").write_text("secret")
+    (scene.folder / "scene.xml").write_text(f'<scene version="3.0.0">{inner}</scene>')
+    if not SCENES[inner]:
+        refuse_files_outside(root, scene)
+        return
+    with pytest.raises(ResultsError, match=rf"scene\.xml is not read: .*({SCENES[inner]})"):
+        refuse_files_outside(root, scene)
