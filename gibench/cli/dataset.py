@@ -71,6 +71,13 @@ def make(
             show_default="indoor",
         ),
     ] = None,
+    opened: Annotated[
+        str | None,
+        typer.Option(help="What is taken away: ceiling, or stage: a wall too.", show_default="none"),
+    ] = None,
+    gloss: Annotated[
+        str | None, typer.Option(help="much: rooms with polished floors and furniture.", show_default="any")
+    ] = None,
     scene: SceneFiles = None,
     up: UpAxis = None,
     scale: Scale = None,
@@ -109,6 +116,8 @@ def make(
         "kinds": None if kind is None else names_in(kind, "--kind"),
         "lighting": lighting or (None if environments is None else "environments"),
         "environments": None if environments is None else names_in(environments, "--environments"),
+        "opened": opened,
+        "gloss": gloss,
         "cameras": None if cameras is None else str(cameras),
         **scene_options(scene, up, scale, allow_missing, allow_outside),
     }
@@ -134,6 +143,8 @@ def make(
         "--kind": kind,
         "--lighting": lighting,
         "--environments": environments,
+        "--opened": opened,
+        "--gloss": gloss,
         "--cameras": cameras,
         "--variant": None if variant == "auto" else variant,
         "--workers": None if workers == 1 else workers,

@@ -13,7 +13,7 @@ from gibench.datasets.estimating import estimate
 from gibench.datasets.folder import room_folder, whole_rooms
 from gibench.datasets.making import make
 from gibench.datasets.recipes import Recipe
-from gibench.datasets.records import Described
+from gibench.datasets.records import Described, Polished
 
 #: What moves in a sequence, in words.
 MOVING = {"camera": "the camera moves", "light": "the light moves", "both": "camera and light move"}
@@ -51,6 +51,10 @@ def describe(root: Path, manifest: dict[str, Any]) -> None:
     if recipe.get("lighting", "own") != "own":
         maps = f" ({', '.join(map(str, recipe['environments']))})" if recipe["environments"] else ""
         say(_row("lighting", f"{recipe['lighting']}{maps}, one of its own a frame"))
+    if recipe.get("opened", "none") != "none":
+        say(_row("opened", "no ceiling" + (" and one wall less" if recipe["opened"] == "stage" else "")))
+    if recipe.get("gloss", "any") != "any":
+        say(_row("gloss", _gloss(root)))
     for name, sequence in recipe.get("sequences", {}).items():
         moving = MOVING[sequence["moves"]]
         say(_row("sequence", f"{name}: {sequence['views']} frames, {moving}"))
@@ -100,6 +104,19 @@ def dry_run(recipe: Recipe, variant: str, workers: int) -> None:
     say(_row("time", f"{most}{duration(result.seconds)} ({result.variant}, {speed})"))
     say(_row("disk", f"about {amount(result.bytes, 'B')}"))
     say("Time and disk are scaled from one small frame of a first room; nothing was kept.")
+
+
+def _gloss(root: Path) -> str:
+    """What the cameras of the rooms see of it."""
+    seen = []
+    for room in whole_rooms(root):
+        path = room_folder(root, room) / "room.json"
+        try:
+            described = parsed(gate.read_inside(root, path.relative_to(root)), Polished)
+        except (gate.GateError, ValueError) as problem:
+            return f"much; {path} is damaged: {problem}"
+        seen.append(described["parameters"].get("gloss", 0.0))
+    return f"much, {100 * sum(seen) / len(seen):.0f} % of what cameras see" if seen else "much"
 
 
 def _tell_scenes(root: Path) -> None:

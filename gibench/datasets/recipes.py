@@ -131,6 +131,13 @@ class Recipe(BaseModel):
     environments: Annotated[tuple[str, ...], Field(strict=False)] = Field(
         (), description="a set of maps that ship, such as indoor or outdoor, a folder, or a list of maps"
     )
+    opened: Literal["none", "ceiling", "stage"] = Field(
+        "none",
+        description='"none", "ceiling" or "stage" (the ceiling, or the ceiling and one wall, are taken away)',
+    )
+    gloss: Literal["any", "much"] = Field(
+        "any", description='"any" or "much" (rooms with polished floors and furniture)'
+    )
     rendered: Literal["all", "stills", "path"] = Field(
         "all", description='"all", "stills" or "path" (which of the frames of a room are rendered)'
     )
@@ -234,6 +241,10 @@ class Recipe(BaseModel):
                     "views",
                     "0 is not allowed: only scenes have cameras of their own; allowed is an integer from 1",
                 )
+        elif self.gloss != "any":
+            raise PydanticCustomError(
+                "scenes", "gloss is set, but scenes bring their own materials: leave it out"
+            )
         elif self.environment != "auto":
             raise PydanticCustomError(
                 "scenes", "environment is set, but scenes bring their own: leave it out"
@@ -317,7 +328,7 @@ class Recipe(BaseModel):
             del values["path_rooms"]
         if not self.sample_seed:
             del values["sample_seed"]
-        for key in ("path_moves", "sequences", "lighting", "environments"):
+        for key in ("path_moves", "sequences", "lighting", "environments", "opened", "gloss"):
             if not values[key] or values[key] == type(self).model_fields[key].default:
                 del values[key]
         if self.environments:

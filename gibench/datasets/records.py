@@ -155,3 +155,15 @@ class Described(Checked):
 
     kind: str
     source: Source
+
+
+class Shine(Checked):
+    """What a generated room says of its gloss."""
+
+    gloss: Annotated[float, Field(ge=0, le=1)] = 0.0
+
+
+class Polished(Checked):
+    """`room.json` of a generated room, as far as `gibench dataset info` tells of its gloss."""
+
+    parameters: Shine

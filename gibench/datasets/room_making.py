@@ -119,10 +119,23 @@ def sampled_room(recipe: Recipe, room: int) -> Room | ImportedRoom:
     built = _sampled(recipe, room)
     if recipe.lighting == "area-light":
         aspect = recipe.resolution[0] / recipe.resolution[1]
-        return lit(built, AreaLights(light_space(built), aspect), recipe.moves())
-    if recipe.lighting == "environments":
-        return lit(built, Environments(panoramas_of(recipe)), recipe.moves())
-    return built
+        built = lit(built, AreaLights(light_space(built), aspect), recipe.moves())
+    elif recipe.lighting == "environments":
+        built = lit(built, Environments(panoramas_of(recipe)), recipe.moves())
+    return _opened(built, recipe.opened)
+
+
+def _opened(room: Room | ImportedRoom, opened: str) -> Room | ImportedRoom:
+    """After cameras and lights have found their places, which they have between walls and under a ceiling."""
+    if opened == "none":
+        return room
+    if isinstance(room, Room):
+        from gibench.generators.opened import opened_room
+
+        return opened_room(room, opened)
+    from gibench.generators.imported.room import opened_import
+
+    return opened_import(room, opened)
 
 
 def _sampled(recipe: Recipe, room: int) -> Room | ImportedRoom:
@@ -149,6 +162,7 @@ def _sampled(recipe: Recipe, room: int) -> Room | ImportedRoom:
         path=None if recipe.path == "stills" or recipe.path_views else recipe.path,
         sequences=recipe.plans(),
         environment=None if recipe.environment == "auto" else recipe.environment,
+        gloss=recipe.gloss,
     )
 
 

@@ -47,11 +47,11 @@ class Palette:
         }
         self._entropy = entropy
         self._drawn: dict[str, str] = {}
-        self._glossy: tuple[str, str] | None = None
+        self._glossy: set[tuple[str, str]] = set()
 
     def polish(self, family: str, slot: str) -> None:
         """Make what has not been drawn yet of a family's slot a polished surface."""
-        self._glossy = (family, slot)
+        self._glossy.add((family, slot))
 
     def rng(self, key: str) -> np.random.Generator:
         """The generator of a draw with that key."""
@@ -60,7 +60,7 @@ class Palette:
 
     def name_of(self, thing: str, family: str, slot: str, variant: str) -> str:
         """Name of the material of a part: of the thing of that name, in its family's slot and variant."""
-        glossy = self._glossy == (family, slot)
+        glossy = (family, slot) in self._glossy
         reach = REACH.get(slot, FAMILY)
         if glossy:
             key = f"{slot}/{family}/polished"

@@ -19,6 +19,7 @@ from gibench.generators.cameras import (
     sample_stills,
 )
 from gibench.generators.daylight import sample_daylight
+from gibench.generators.gloss import GLOSS, MUCH, visible_gloss
 from gibench.generators.layouts import FURNISH
 from gibench.generators.layouts.placement import Placed, Plan, RejectedRoom
 from gibench.generators.layouts.solids import bounds_of, component_boxes, moved, triangles, whole_box
@@ -72,6 +73,7 @@ def sample_room(
     path_views: int = 0,
     sequences: Sequence[PathPlan] = (),
     environment: Environment | str | None = None,
+    gloss: str = "any",
     **fixed: Any,
 ) -> Room:
     """Draw room number `index` of the run `seed`; it depends on these two and on the options alone.
@@ -80,12 +82,15 @@ def sample_room(
     "walk", "orbit" or "eight" for one path of that many frames. path_views: cameras on the path in a room that has
     stills too: above 0 the `views` are stills, as without a path, and these come after them. sequences: the same for
     any number of paths by name, in place of `path`. environment: what lies outside: "none", "sunsky", the path of an
-    HDR panorama, or an Environment; drawn if None.
+    HDR panorama, or an Environment; drawn if None. gloss: "any", or "much" for the same rooms with polished floors and
+    furniture, of which the cameras see at least the share `gloss.MUCH`; `Room.parameters` then says how much.
     fixed: arguments of `build_shell` that are not drawn, such as width=4.0.
 
     A try that fails is counted in `Room.rejections` by its reason and drawn again. Raises RejectedRoom when all
     tries have failed, UnknownKind for a kind or path that does not exist.
     """
+    if gloss not in GLOSS:
+        raise UnknownKind(f"there is no gloss {gloss!r}; choose from {', '.join(GLOSS)}")
     for name in kinds if kind is None else (kind,):
         if name not in ALL_KINDS:
             raise UnknownKind(f"there is no room kind {name!r}; choose from {', '.join(ALL_KINDS)}")
@@ -101,7 +106,7 @@ def sample_room(
     for attempt in range(TRIES):
         try:
             room = _try_room(
-                seed, index, attempt, kind, views, path, sequences, environment, fixed, rejections
+                seed, index, attempt, kind, views, path, sequences, environment, gloss, fixed, rejections
             )
         except RejectedRoom as refusal:
             rejections[refusal.reason] += 1
@@ -136,6 +141,7 @@ def _try_room(
     path: str | None,
     sequences: Sequence[PathPlan],
     environment: Environment | str | None,
+    gloss: str,
     fixed: Mapping[str, Any],
     rejections: Counter[str],
 ) -> Room:
@@ -164,7 +170,10 @@ def _try_room(
         raise RejectedRoom("no free floor")
 
     palette = Palette(_lane_seed(seed, index, "materials", attempt), kind)
-    _polish_something(palette, plan)
+    if gloss == "much":
+        _polish_everything(palette, plan)
+    else:
+        _polish_something(palette, plan)
     objects = _objects(plan, palette)
 
     stage = Stage(free, shell.height, _middles(plan), _caster(plan), len(shell.pieces))
@@ -176,6 +185,11 @@ def _try_room(
         walked, refused_too = sample_planned(lane("path", number), stage, sequence)
         cameras, refused = cameras + walked, refused + refused_too
     rejections.update({f"view: {reason}": count for reason, count in refused.items()})
+    shine: dict[str, float] = {}
+    if gloss == "much":
+        shine["gloss"] = round(visible_gloss(objects, palette.materials, cameras), 4)
+        if shine["gloss"] < MUCH:
+            raise RejectedRoom("little gloss")
 
     lights = tuple(
         placed_light(light, p.name, p.position, p.yaw) for p in plan.placed for light in p.furniture.lights
@@ -194,6 +208,7 @@ def _try_room(
         "shell": dict(shell.parameters),
         "attempt": attempt,
         "glossy": _large_glossy(objects, palette),
+        **shine,
     }
     return Room(
         seed,
@@ -248,6 +263,20 @@ def _polish_something(palette: Palette, plan: Plan) -> None:
     wanted, favourite = rng.random() < GLOSSY_SHARE, rng.random()
     if not wanted:
         return
+    choices = _polishable(plan)
+    # The floor is the largest mirror of a room, and the most common one.
+    choice = 0 if favourite < 0.5 else int(rng.integers(len(choices)))
+    palette.polish(*choices[choice])
+
+
+def _polish_everything(palette: Palette, plan: Plan) -> None:
+    """The floor and all furniture with surfaces in one piece show reflections."""
+    for family, slot in _polishable(plan):
+        palette.polish(family, slot)
+
+
+def _polishable(plan: Plan) -> list[tuple[str, str]]:
+    """Families and slots with large surfaces that take a polish, the floor first."""
     choices = [("floor", "floor")]
     for thing in plan.placed:
         slots = {part.slot for part in thing.furniture.parts}
@@ -255,9 +284,7 @@ def _polish_something(palette: Palette, plan: Plan) -> None:
             choices += [
                 (thing.furniture.family, slot) for slot in ("wood", "lacquer", "stone") if slot in slots
             ]
-    # The floor is the largest mirror of a room, and the most common one.
-    choice = 0 if favourite < 0.5 else int(rng.integers(len(choices)))
-    palette.polish(*choices[choice])
+    return choices
 
 
 def _objects(plan: Plan, palette: Palette) -> tuple[RoomObject, ...]:

@@ -128,6 +128,21 @@ def import_room(
     return ImportedRoom(seed, index, scene, tuple(cameras), openings, dict(rejections), found)
 
 
+def opened_import(room: ImportedRoom, opened: str) -> ImportedRoom:
+    """The room without its ceiling, or also without a wall; see `opened.opened_scene`.
+
+    Raises SceneFileError where no free space was found, or none of it is open to the sky afterwards.
+    """
+    from gibench.generators.imported.opened import opened_scene
+
+    if not len(room.free):
+        raise SceneFileError(
+            f"{room.scene.tree.file}: opened is '{opened}', but nothing in the scene is enclosed: leave it out"
+        )
+    # Where most of the sky is seen, portals cost more noise than they save.
+    return replace(room, scene=opened_scene(room.scene, opened, room.free), openings=np.zeros((0, 3, 3)))
+
+
 def _near_planes_told(scene: ImportedScene, resolution: tuple[int, int]) -> ImportedScene:
     """The scene with a warning for each camera whose near plane cuts away something that is seen here."""
     from gibench.generators.imported.survey import hits
