@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
@@ -14,7 +13,7 @@ from gibench.baselines.method import Method
 from gibench.benchmarks.errors import TrackError
 from gibench.datasets.checked import Name
 from gibench.datasets.errors import RecipeError, nearest
-from gibench.datasets.recipes import Recipe, check_recipe
+from gibench.datasets.recipes import Recipe, check_recipe, toml_values
 from gibench.metrics import METRICS
 
 Names = Annotated[tuple[str, ...], Field(strict=False)]
@@ -186,8 +185,8 @@ def load_track(name: str) -> Track:
             f"no track '{name}'; {nearest(name, track_names())}, or give the path of a .toml file"
         )
     try:
-        values = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as problem:
+        values = toml_values(text.encode())
+    except ValueError as problem:
         raise TrackError(f"track {name} is no valid TOML: {problem}") from None
     return check_track(values, source=f"track {name}")
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gibench.cli.dataset import AllowMissing, AllowOutside, Scale, SceneFiles, UpAxis
+from gibench.cli.dataset import AllowMissing, AllowOutside, Parameters, Scale, SceneFiles, UpAxis
 from gibench.cli.output import say
 from gibench.errors import GibenchError
 
@@ -36,6 +36,7 @@ def run_track(
     scale: Scale = None,
     allow_missing: AllowMissing = False,
     allow_outside: AllowOutside = False,
+    define: Parameters = None,
     settings: Annotated[
         list[str] | None,
         typer.Option(
@@ -79,7 +80,7 @@ def run_track(
         raise TrackError("--scene takes the place of rooms: leave out --rooms")
     scenes = {
         key: value
-        for key, value in scene_options(scene, up, scale, allow_missing, allow_outside).items()
+        for key, value in scene_options(scene, up, scale, allow_missing, allow_outside, define).items()
         if value is not None
     }
     chosen.preset(preset).recipe("reference", scenes=scenes)
@@ -97,7 +98,7 @@ def run_track(
         "--variant": None if variant == "auto" else variant,
     }
     words = [str(word) for option, value in given.items() if value is not None for word in (option, value)]
-    words += scene_words(scene, up, scale, allow_missing, allow_outside)
+    words += scene_words(scene, up, scale, allow_missing, allow_outside, define)
     words += [word for text in settings or () for word in ("--set", text)]
     order = Order(
         track=chosen,

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from gibench.cli.dataset import AllowMissing, AllowOutside, Scale, UpAxis
+from gibench.cli.dataset import AllowMissing, AllowOutside, Parameters, Scale, UpAxis
 from gibench.cli.output import say
 
 
@@ -18,6 +18,7 @@ def convert(
     scale: Scale = None,
     allow_missing: AllowMissing = False,
     allow_outside: AllowOutside = False,
+    define: Parameters = None,
 ) -> None:
     """Write a scene for Mitsuba 3: Z up, metres, with all its files, and say what was changed."""
     from gibench.cli.making import tell_scene
@@ -25,7 +26,13 @@ def convert(
     from gibench.generators.imported.room import describe, import_room, write_imported_room
     from gibench.generators.imported.scene import ImportSettings, import_scene
 
-    settings = ImportSettings(up or "auto", 1.0 if scale is None else scale, allow_missing, allow_outside)
+    settings = ImportSettings(
+        up or "auto",
+        1.0 if scale is None else scale,
+        allow_missing,
+        allow_outside,
+        parameters=tuple(define or ()),
+    )
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise SceneFileError(f"{out} is there already: choose a new folder with --out")
     read = import_scene(scene, settings)

@@ -32,6 +32,17 @@ AllowOutside = Annotated[
     bool, typer.Option("--allow-outside", help="Read files outside the folder of the scene.")
 ]
 
+Parameters = Annotated[
+    list[str] | None,
+    typer.Option(
+        "-D",
+        "--define",
+        metavar="NAME=VALUE",
+        help="A $parameter of the scene files; may be repeated.",
+        show_default=False,
+    ),
+]
+
 Folder = Annotated[Path, typer.Argument(metavar="DIR", help="The dataset's folder.", show_default=False)]
 
 
@@ -87,6 +98,7 @@ def make(
     ] = None,
     allow_missing: AllowMissing = False,
     allow_outside: AllowOutside = False,
+    define: Parameters = None,
     variant: Annotated[str, typer.Option(help="Mitsuba's, or auto: the fastest that works.")] = "auto",
     workers: Annotated[int, typer.Option(help="Processes that render at the same time.")] = 1,
     dry_run: Annotated[
@@ -119,7 +131,7 @@ def make(
         "opened": opened,
         "gloss": gloss,
         "cameras": None if cameras is None else str(cameras),
-        **scene_options(scene, up, scale, allow_missing, allow_outside),
+        **scene_options(scene, up, scale, allow_missing, allow_outside, define),
     }
     chosen = _recipe(preset, recipe, {key: value for key, value in asked.items() if value is not None})
     check_variant(variant)
@@ -150,7 +162,7 @@ def make(
         "--workers": None if workers == 1 else workers,
     }
     words = [str(word) for option, value in given.items() if value is not None for word in (option, value)]
-    words += scene_words(scene, up, scale, allow_missing, allow_outside)
+    words += scene_words(scene, up, scale, allow_missing, allow_outside, define)
     from gibench.cli.making import make_and_tell
 
     make_and_tell(root, chosen, variant, workers, shlex.join(["make-dataset", *words]))
@@ -219,6 +231,7 @@ def scene_options(
     scale: float | None,
     allow_missing: bool,
     allow_outside: bool,
+    define: list[str] | None = None,
 ) -> dict[str, Any]:
     """Keys of a recipe for the options of imported scenes; None where an option was not given."""
     return {
@@ -227,6 +240,7 @@ def scene_options(
         "scale": scale,
         "allow_missing": allow_missing or None,
         "allow_outside": allow_outside or None,
+        "parameters": tuple(define) if define else None,
     }
 
 
@@ -236,13 +250,15 @@ def scene_words(
     scale: float | None,
     allow_missing: bool,
     allow_outside: bool,
+    define: list[str] | None = None,
 ) -> list[str]:
     """The same options as words of a command line."""
     words = [word for scene in scenes or () for word in ("--scene", str(scene))]
     words += [] if up is None else ["--up", up]
     words += [] if scale is None else ["--scale", repr(scale)]
     words += ["--allow-missing"] if allow_missing else []
-    return words + (["--allow-outside"] if allow_outside else [])
+    words += ["--allow-outside"] if allow_outside else []
+    return words + [word for text in define or () for word in ("-D", text)]
 
 
 def _recipe(preset: str | None, recipe: Path | None, overrides: dict[str, Any]) -> Recipe:

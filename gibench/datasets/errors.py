@@ -20,6 +20,10 @@ class MakingError(GibenchError):
     """Making a dataset stopped half-way; the rooms that are whole stay valid."""
 
 
+class BadScene(MakingError):
+    """A scene file that turned out to be wrong while its room was made."""
+
+
 class Interrupted(MakingError):
     """The user stopped the making; the message says how to continue."""
 

@@ -71,12 +71,15 @@ class RoomChecker:
 
     def __call__(self, room: int, report: pool.Report) -> dict[str, Any]:
         """Return "frames", "rejections" and "seconds", "measured" once a worker, or "rejected": reason."""
+        from gibench.generators.imported.errors import NoPlaceForCamera
         from gibench.generators.rooms import RejectedRoom
 
         started = time.perf_counter()
         try:
             built = sampled_room(self.recipe, room)
-        except RejectedRoom as reason:
+        except (RejectedRoom, NoPlaceForCamera) as reason:
+            if len(self.recipe.scenes) == 1:
+                raise
             return {"rejected": str(reason)}
         seconds = time.perf_counter() - started
         measured = None if self.has_measured else self._measured(built)

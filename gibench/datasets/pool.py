@@ -22,7 +22,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any
 
-from gibench.datasets.errors import MakingError, RecipeError
+from gibench.datasets.errors import BadScene, MakingError, RecipeError
 from gibench.errors import GibenchError
 
 #: Rooms after which a worker makes way for a fresh one.
@@ -199,6 +199,8 @@ def _heard(worker: _Worker, kind: str, content: Any, listener: Listener) -> bool
         raise RecipeError(content)
     if kind == "failed":
         raise MakingError(content)
+    if kind == "bad scene":
+        raise BadScene(content)
     assert worker.room is not None
     if kind != "done":
         listener.message(worker.room, kind, content)
@@ -264,8 +266,13 @@ def _worker(connection: Connection, work: Work) -> None:
     except Exception as problem:
         if os.environ.get("GIBENCH_DEBUG"):
             traceback.print_exc()
+        from gibench.generators.imported.errors import SceneFileError
+
         with contextlib.suppress(OSError):
-            connection.send(("failed", _explained(problem, room)))
+            if isinstance(problem, SceneFileError):
+                connection.send(("bad scene", str(problem)))
+            else:
+                connection.send(("failed", _explained(problem, room)))
 
 
 def leave_signals_to_parent() -> None:

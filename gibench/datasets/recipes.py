@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import tomllib
 from collections.abc import Mapping
 from importlib import resources
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
+from gibench import gate
 from gibench.datasets.errors import RecipeError, nearest
 from gibench.rendering import channels as contract
 
@@ -32,6 +34,7 @@ OPTIONS = {
     "scenes": "--scene",
     "allow_missing": "--allow-missing",
     "allow_outside": "--allow-outside",
+    "parameters": "-D",
 }
 
 # Lists in TOML become tuples here: a recipe is a value that can be compared and hashed.
@@ -154,6 +157,9 @@ class Recipe(BaseModel):
     scale: float = Field(1.0, gt=0, le=1e6, description="a number above 0 (metres of a scene file's unit)")
     allow_missing: bool = Field(False, description="true or false (leave out what needs a missing file)")
     allow_outside: bool = Field(False, description="true or false (read files outside of a scene's folder)")
+    parameters: Annotated[tuple[str, ...], Field(strict=False)] = Field(
+        (), description='a list such as ["samples=64"] (values of $parameters of scene files)'
+    )
     cameras: str | None = Field(None, description="the path of a camera file for the scenes (JSON)")
     licence: str = Field("CC0-1.0", min_length=1, description="the SPDX name of the licence of the data")
 
@@ -231,7 +237,7 @@ class Recipe(BaseModel):
     @model_validator(mode="after")
     def _scenes_that_can_be(self) -> Self:
         if not self.scenes:
-            for key in ("up", "scale", "allow_missing", "allow_outside", "cameras"):
+            for key in ("up", "scale", "allow_missing", "allow_outside", "cameras", "parameters"):
                 if getattr(self, key) != type(self).model_fields[key].default:
                     raise PydanticCustomError(
                         "scenes", "{key} is set, but only scenes have it: set scenes too", {"key": key}
@@ -348,6 +354,8 @@ class Recipe(BaseModel):
         else:
             for key in ("scenes", "up", "scale", "allow_missing", "allow_outside", "cameras"):
                 del values[key]
+        if not self.parameters:
+            del values["parameters"]
         return values
 
     def environment_files(self) -> tuple[EnvironmentFile, ...]:
@@ -365,7 +373,9 @@ class Recipe(BaseModel):
         from gibench.generators.imported.scene import ImportSettings
 
         cameras = None if self.cameras is None else Path(self.cameras)
-        return ImportSettings(self.up, self.scale, self.allow_missing, self.allow_outside, cameras)
+        return ImportSettings(
+            self.up, self.scale, self.allow_missing, self.allow_outside, cameras, self.parameters
+        )
 
 
 def file_sha256(path: Path) -> str:
@@ -402,28 +412,50 @@ def load_recipe(path: Path, overrides: Mapping[str, Any] | None = None) -> Recip
     its folder. Raises `RecipeError` with the file, the key and what is allowed.
     """
     try:
-        values = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as problem:
-        raise RecipeError(f"recipe {path} cannot be read: {problem.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as problem:
+        values = toml_values(gate.read_regular(path))
+    except gate.GateError as problem:
+        raise RecipeError(f"recipe {problem}") from None
+    except ValueError as problem:
         raise RecipeError(f"recipe {path} is no valid TOML: {problem}") from None
     environment = values.get("environment")
     if isinstance(environment, str) and environment not in ENVIRONMENTS:
-        values["environment"] = str((path.parent / environment).resolve())
+        values["environment"] = _beside(path, environment)
     if isinstance(maps := values.get("environments"), str | list):
         # The name of a map that ships is no file beside the recipe, or that file is meant.
-        asked = [maps] if isinstance(maps, str) else [name for name in maps if isinstance(name, str)]
-        beside = [path.parent / name for name in asked]
         values["environments"] = [
-            str(file.resolve()) if file.exists() else name for name, file in zip(asked, beside, strict=True)
+            beside if isinstance(name, str) and os.path.exists(beside := _beside(path, name)) else name
+            for name in ([maps] if isinstance(maps, str) else maps)
         ]
     if isinstance(scenes := values.get("scenes"), list):
-        values["scenes"] = [
-            str((path.parent / scene).resolve()) for scene in scenes if isinstance(scene, str)
-        ]
+        # What is no text is refused with the rest of the recipe.
+        values["scenes"] = [_beside(path, scene) if isinstance(scene, str) else scene for scene in scenes]
     if isinstance(cameras := values.get("cameras"), str):
-        values["cameras"] = str((path.parent / cameras).resolve())
+        values["cameras"] = _beside(path, cameras)
     return check_recipe(values, source=str(path), overrides=overrides)
+
+
+def toml_values(content: bytes) -> dict[str, Any]:
+    """What a TOML file holds. Raises ValueError, whose text fits on a line, for what is none."""
+    try:
+        # Editors of Windows write a byte order mark, which TOML does not know.
+        return tomllib.loads(content.decode("utf-8-sig"))
+    except RecursionError:
+        raise ValueError("too many brackets in one another") from None
+
+
+def _beside(recipe: Path, name: str) -> str:
+    try:
+        return str((recipe.parent / name).resolve())
+    except (OSError, ValueError) as problem:
+        reason = problem.strerror if isinstance(problem, OSError) else problem
+        raise RecipeError(f"recipe {recipe}: {name[:60]!r} is no name of a file: {reason}") from None
+
+
+def _is_file(name: str) -> bool:
+    try:
+        return Path(name).is_file()
+    except (OSError, ValueError):  # too long, or with a null character
+        return False
 
 
 def check_recipe(
@@ -450,16 +482,18 @@ def _validated(values: dict[str, Any], source: str, options: frozenset[str] = fr
         recipe = Recipe.model_validate(values)
     except ValidationError as problems:
         raise RecipeError(_message(problems, values, source, options)) from None
-    if recipe.environment not in ENVIRONMENTS and not Path(recipe.environment).is_file():
+    if recipe.environment not in ENVIRONMENTS and not _is_file(recipe.environment):
         near = nearest(recipe.environment, ENVIRONMENTS)
-        raise RecipeError(f"{source}: environment: there is no file {recipe.environment}; {near}")
+        raise RecipeError(f"{source}: environment: there is no file {recipe.environment[:200]}; {near}")
     if recipe.environments:
         recipe.environment_files()
     for scene in recipe.scenes:
-        if not Path(scene).is_file():
-            raise RecipeError(f"{_place('scenes', source, options)}: there is no scene file {scene}")
-    if recipe.cameras is not None and not Path(recipe.cameras).is_file():
-        raise RecipeError(f"{_place('cameras', source, options)}: there is no camera file {recipe.cameras}")
+        if not _is_file(scene):
+            raise RecipeError(f"{_place('scenes', source, options)}: there is no scene file {scene[:200]}")
+    if recipe.cameras is not None and not _is_file(recipe.cameras):
+        raise RecipeError(
+            f"{_place('cameras', source, options)}: there is no camera file {recipe.cameras[:200]}"
+        )
     return recipe
 
 

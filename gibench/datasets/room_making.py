@@ -248,6 +248,7 @@ class RoomMaker:
 
     def __call__(self, room: int, report: Callable[[str, Any], None]) -> dict[str, Any]:
         """Make room number `room`; reports ("frame", {"paths", "seconds" in kernels}) after each frame."""
+        from gibench.generators.imported.errors import NoPlaceForCamera
         from gibench.generators.rooms import RejectedRoom
 
         final = room_folder(self.root, room)
@@ -258,8 +259,10 @@ class RoomMaker:
             (partial / RECORD).write_bytes(as_json(record))
             sync_tree(partial)
             partial.rename(final)
-        except RejectedRoom as reason:
+        except (RejectedRoom, NoPlaceForCamera) as reason:
             shutil.rmtree(partial)
+            if len(self.recipe.scenes) == 1:
+                raise
             return {"rejected": str(reason)}
         except BaseException:
             shutil.rmtree(partial, ignore_errors=True)

@@ -98,7 +98,8 @@ def _place_light(node: Node, matrix: FloatArray, turn: FloatArray, scale: float)
         before = 1.0 if own is None else float(numbers(own, own.get("value", ""), 1)[0])
         if own is not None:
             node.remove(own)
-        node.append(new("float", node, name="scale", value=repr(before * scale**2)))
+        # Mitsuba divides by one distance in the projector's own units and by one in the world's.
+        node.append(new("float", node, name="scale", value=repr(before * scale)))
     intensity = node.property("intensity")
     if node.type in INTENSITIES and scale != 1:
         if intensity is None:

@@ -114,7 +114,7 @@ class _Reader:
                 if name and name not in self.values:
                     self.values[name] = self._text(child, "value")
             elif child.tag == "path":
-                folder = self.tree.folder / self._text(child, "value").replace("\\", "/")
+                folder = self.tree.folder / self._text(child, "value").strip().replace("\\", "/")
                 if not self.tree.allow_outside and not locating.is_inside(folder, self.tree.folder):
                     raise SceneFileError(
                         f"{child.where}: <path> leads outside the folder of the scene: allow it with --allow-outside"

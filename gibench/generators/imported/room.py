@@ -17,7 +17,7 @@ import numpy as np
 from gibench import gate
 from gibench.generators.cameras import NoView, PathPlan, sample_path, sample_planned, sample_stills
 from gibench.generators.imported.changes import Change
-from gibench.generators.imported.errors import SceneFileError
+from gibench.generators.imported.errors import NoPlaceForCamera, SceneFileError
 from gibench.generators.imported.glb import write_scene_glb
 from gibench.generators.imported.placing import placed_matrix
 from gibench.generators.imported.scene import ImportedScene
@@ -99,10 +99,13 @@ def import_room(
         from gibench.generators.imported.survey import survey
 
         if not len(found):
-            raise SceneFileError(
+            raise NoPlaceForCamera(
                 f"{scene.tree.file}: no place for a camera: {why_none}; give cameras with --cameras"
             )
-        stage = survey(scene.loaded, found)
+        try:
+            stage = survey(scene.loaded, found)
+        except NoPlaceForCamera as problem:
+            raise NoPlaceForCamera(f"{scene.tree.file}: {problem}") from None
         try:
             draws = []
             if views and path is None:
@@ -117,7 +120,7 @@ def import_room(
                 rejections.update({f"view: {reason}": count for reason, count in refused.items()})
         except NoView as refusal:
             worst = ", ".join(f"{reason} {count}" for reason, count in refusal.reasons.most_common(3))
-            raise SceneFileError(
+            raise NoPlaceForCamera(
                 f"{scene.tree.file}: no {refusal.what} passed the view checks ({worst}); is --scale right? Or give "
                 "cameras with --cameras"
             ) from None

@@ -101,7 +101,7 @@ class ImportedScene:
         select_variant()
         import mitsuba as mi
 
-        from gibench.rendering.scene import wrap
+        from gibench.rendering.scene import SceneError, wrap
 
         # Mitsuba reads files alone, and only while it loads.
         with tempfile.TemporaryDirectory(prefix="gibench-") as scratch:
@@ -115,6 +115,8 @@ class ImportedScene:
             try:
                 with threads_to_load():
                     return wrap(mi.load_string(text, optimize=False))
+            except SceneError as problem:
+                raise SceneFileError(f"{self.tree.file}: {problem}") from None
             except (RuntimeError, UnicodeDecodeError) as problem:
                 raise SceneFileError(refusal(problem, places, self.tree.file, scratch)) from None
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from gibench.generators.cameras import HEIGHTS, Stage
-from gibench.generators.imported.errors import SceneFileError
+from gibench.generators.imported.errors import NoPlaceForCamera
 from gibench.generators.parts import FloatArray
 from gibench.rendering.free_space import enclosed, fan, seen_from, surroundings
 from gibench.rendering.scene import Scene
@@ -82,7 +82,7 @@ def hits(scene: Scene, origins: FloatArray, directions: FloatArray) -> tuple[Any
 def survey(scene: Scene, found: FloatArray) -> Stage:
     """Find the floor, where on it a camera may stand, and what to look at. Needs a vectorised variant.
 
-    found: (N, 3) points of the free space. Raises SceneFileError where there is no room to stand in.
+    found: (N, 3) points of the free space. Raises NoPlaceForCamera where there is no room to stand in.
     """
     floor = _floor(scene, found)
     free, height = _free_floor(scene, found, floor)
@@ -140,7 +140,7 @@ def _free_floor(scene: Scene, found: FloatArray, floor: float) -> tuple[shapely.
     area = np.bincount(pieces.ravel()) * cell**2
     standing = free & (area[pieces.ravel()] >= LEAST_FREE)
     if not standing.any():
-        raise SceneFileError(
+        raise NoPlaceForCamera(
             f"no place for a camera: above the floor at {floor:.2f} m there is no free place of {LEAST_FREE} m²; is "
             "--scale right? Or give cameras with --cameras"
         )

@@ -57,7 +57,7 @@ def test_the_options_and_the_keys_of_scenes_are_listed(capsys, monkeypatch):
     listed = {
         o for line in table("option").splitlines() for o in re.findall(r"--[a-z][a-z-]*", line.split("|")[1])
     }
-    own = {"--scene", "--up", "--scale", "--allow-missing", "--allow-outside", "--cameras"}
+    own = {"--scene", "--up", "--scale", "--allow-missing", "--allow-outside", "--cameras", "--define"}
     assert listed == own
     assert own <= options(["make-dataset"], capsys)
     assert own - {"--cameras"} <= options(["gibench", "bench", "run"], capsys)
@@ -65,7 +65,12 @@ def test_the_options_and_the_keys_of_scenes_are_listed(capsys, monkeypatch):
     said = re.search(r"In a recipe they are (.*?)\. They hold", text(), re.S)
     assert said is not None
     keys = {re.match(r"\w+", word)[0] for word in re.findall(r"`([^`]+)`", said[1])}
-    assert keys == {option.removeprefix("--").replace("-", "_") for option in own - {"--scene"}} | {"scenes"}
+    assert keys == {
+        option.removeprefix("--").replace("-", "_") for option in own - {"--scene", "--define"}
+    } | {
+        "scenes",
+        "parameters",
+    }
     assert keys <= set(Recipe.model_fields)
 
 

@@ -23,7 +23,8 @@ def srgb_tags(root: Node, note: Note) -> None:
             text = node.get("value", "")
             if not text.strip().startswith("#"):
                 color = constant_color(node, 0.0)
-                if color is None:
+                # No display shows more than a few times its white; powers of what is huge would overflow.
+                if color is None or max(map(abs, color)) > 1e6:
                     raise SceneFileError(
                         f"{node.where}: '{text}' is no colour: write #rrggbb or three numbers"
                     )

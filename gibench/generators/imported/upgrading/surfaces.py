@@ -30,6 +30,8 @@ def conductors(root: Node, note: Note) -> None:
         ior = {"air": 1.000277, "vacuum": 1.0, "water": 1.333}.get(text)
         if ior is None:
             ior = number(outside, text)
+        if ior <= 0:
+            raise SceneFileError(f"{outside.where}: extEta is {text}: an index of refraction is above 0")
         eta, k = node.property("eta"), node.property("k")
         colors = [constant_color(part, 0.0) for part in (eta, k) if part is not None]
         if abs(ior - 1) < 1e-3:
