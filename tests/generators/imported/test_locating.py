@@ -93,8 +93,17 @@ def test_no_way_leads_outside(folders, way):
             with pytest.raises(SceneFileError) as refused:
                 import_scene(scene, ImportSettings(allow_missing=True))
             said = str(refused.value)
-            assert SECRET not in said and "root:" not in said and "\n" not in said, (name, said)
+            for secret in (SECRET, "root:", "\n"):
+                assert secret not in said, (name, said)
             assert "scene.xml:2" in said, (name, said)
+
+
+def opened(scene):
+    """Files that Mitsuba would open, and what is said where the scene is refused."""
+    try:
+        return list(import_scene(scene, ImportSettings(allow_missing=True)).files), ""
+    except SceneFileError as refused:
+        return [], str(refused)
 
 
 def test_random_names_never_leave_the_folder(folders):
@@ -121,12 +130,9 @@ def test_random_names_never_leave_the_folder(folders):
         name = rng.choice(["", "/", "\\", " "]) + rng.choice(["/", "\\"]).join(parts)
         way = rng.choice([way for way in WAYS if way not in ("path", "obj library")])
         scene = written(folders, body(way, name) + SQUARE, version=rng.choice(["0.6.0", "3.0.0"]))
-        try:
-            found = import_scene(scene, ImportSettings(allow_missing=True))
-        except SceneFileError as refused:
-            assert SECRET not in str(refused), (seed, way, name)
-            continue
-        for file in found.files:
+        files, said = opened(scene)
+        assert SECRET not in said, (seed, way, name)
+        for file in files:
             if not isinstance(file, str):
                 assert file.resolve().is_relative_to(folders.resolve()), (seed, way, name)
 
