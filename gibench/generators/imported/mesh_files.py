@@ -47,10 +47,15 @@ def check_meshes(tree: SceneTree) -> None:
 
 
 class _Element(NamedTuple):
+    """properties: name, type of the count of a list or "", type of the values, in the order of the file."""
+
     name: str
     size: int
-    scalars: list[tuple[str, str]]
-    lists: list[tuple[str, str, str]]
+    properties: list[tuple[str, str, str]]
+
+    @property
+    def has_lists(self) -> bool:
+        return any(count for _, count, _ in self.properties)
 
 
 def _ply_header(where: str, content: bytes) -> tuple[str, list[_Element], int]:
@@ -65,11 +70,11 @@ def _ply_header(where: str, content: bytes) -> tuple[str, list[_Element], int]:
             if words[:1] == ["format"]:
                 kind = words[1]
             elif words[:1] == ["element"]:
-                elements.append(_Element(words[1], int(words[2]), [], []))
+                elements.append(_Element(words[1], int(words[2]), []))
             elif words[:2] == ["property", "list"]:
-                elements[-1].lists.append((words[4], PLY_TYPES[words[2]], PLY_TYPES[words[3]]))
+                elements[-1].properties.append((words[4], PLY_TYPES[words[2]], PLY_TYPES[words[3]]))
             elif words[:1] == ["property"]:
-                elements[-1].scalars.append((words[2], PLY_TYPES[words[1]]))
+                elements[-1].properties.append((words[2], "", PLY_TYPES[words[1]]))
         except (IndexError, KeyError, ValueError):
             raise SceneFileError(f"{where}: its header has the line '{line[:60]}', which is no PLY") from None
     if any(element.size < 0 for element in elements):
@@ -87,26 +92,65 @@ def _check_ply(where: str, content: bytes, _index: str) -> None:
             _check_ascii_ply(where, content[at:], elements, vertices, short)
         return
     for element in elements:
-        if element.name != "face":
-            if element.lists:
-                return
-            at += element.size * sum(np.dtype(kind).itemsize for _, kind in element.scalars)
-            if at > len(content):
-                raise short
-            continue
-        if len(element.lists) != 1 or element.lists[0][0] not in ("vertex_index", "vertex_indices"):
+        if element.name == "face":
+            _check_binary_faces(where, content, at, element, vertices, order, short)
             return
-        _, count_type, index_type = element.lists[0]
-        # Scalars may stand before or after the list; which, the header says, but most have none.
-        if element.scalars:
-            return
-        record = np.dtype([("count", order + count_type), ("corners", order + index_type, 3)])
-        room = (len(content) - at) // record.itemsize
-        faces = np.frombuffer(content, record, min(element.size, room), at)
-        _check_corners(where, faces["count"], faces["corners"], vertices)
-        if room < element.size:
+        if element.has_lists:
+            raise SceneFileError(
+                f"{where} has lists before its faces, which is not read: export triangles alone"
+            )
+        at += element.size * sum(np.dtype(kind).itemsize for _, _, kind in element.properties)
+        if at > len(content):
             raise short
+
+
+def _check_binary_faces(
+    where: str,
+    content: bytes,
+    at: int,
+    element: _Element,
+    vertices: int,
+    order: str,
+    short: SceneFileError,
+) -> None:
+    if element.size == 0:
         return
+    # Faces have as many corners as the first, or none of them can be found; what has others is refused anyway.
+    fields: list[Any] = []
+    lists: list[tuple[str, int]] = []
+    place = at
+    for number, (name, count, kind) in enumerate(element.properties):
+        if not count:
+            fields.append((f"{name} {number}", order + kind))
+            place += np.dtype(kind).itemsize
+            continue
+        head = np.dtype(order + count)
+        if place + head.itemsize > len(content):
+            raise short
+        length = int(np.frombuffer(content, head, 1, place)[0])
+        is_faces = name in ("vertex_index", "vertex_indices")
+        if is_faces and length != 3:
+            _check_corners(where, np.array([length]), np.zeros((0, 3)), vertices)
+        if length < 0 or place + length > len(content):
+            raise short
+        fields += [(f"{number} count", head), (f"{number} values", order + kind, (length,))]
+        lists.append(("corners" if is_faces else "", length))
+        if is_faces:
+            fields[-2:] = [("count", head), ("corners", order + kind, (3,))]
+        else:
+            lists[-1] = (f"{number} count", length)
+        place += head.itemsize + length * np.dtype(kind).itemsize
+    record = np.dtype(fields)
+    if "corners" not in (record.names or ()):
+        return
+    room = max(len(content) - at, 0) // record.itemsize
+    faces = np.frombuffer(content, record, min(element.size, room), at)
+    for name, length in lists:
+        if name != "corners" and (faces[name] != length).any():
+            raise SceneFileError(f"{where} has faces with lists of other lengths: export triangles alone")
+    _check_corners(where, faces["count"], faces["corners"], vertices)
+    if room < element.size:
+        raise short
 
 
 def _check_ascii_ply(

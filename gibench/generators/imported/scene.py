@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.etree.ElementTree import tostring
 
+import numpy as np
+
 from gibench.generators.imported.analytic import mesh_shapes
 from gibench.generators.imported.changes import Change
 from gibench.generators.imported.distance_grids import mesh_grids
@@ -114,11 +116,23 @@ class ImportedScene:
             text, places = with_lines(self._with_files(absolute))
             try:
                 with threads_to_load():
-                    return wrap(mi.load_string(text, optimize=False))
+                    loaded = mi.load_string(text, optimize=False)
+                self._check_corners(loaded)
+                return wrap(loaded)
             except SceneError as problem:
                 raise SceneFileError(f"{self.tree.file}: {problem}") from None
             except (RuntimeError, UnicodeDecodeError) as problem:
                 raise SceneFileError(refusal(problem, places, self.tree.file, scratch)) from None
+
+    def _check_corners(self, loaded: Any) -> None:
+        """What `mesh_files` has no check for, before a ray meets it."""
+        for shape in loaded.shapes():
+            if not shape.is_mesh() or shape.face_count() == 0:
+                continue
+            if int(np.array(shape.faces_buffer()).max()) >= shape.vertex_count():
+                raise SceneFileError(
+                    f"{self.tree.file}: faces of the mesh '{shape.id()}' name vertices that it has not: export it again"
+                )
 
     def with_files(self) -> Node:
         """A copy of the scene whose file names are those of a room's folder."""

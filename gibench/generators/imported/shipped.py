@@ -10,6 +10,9 @@ from pathlib import Path
 from gibench.generators.imported.errors import SceneFileError
 from gibench.generators.imported.tree import PLUGINS, Node
 
+OURS = ("sensor", "film", "sampler", "rfilter", "integrator")
+"""Plugins that never reach Mitsuba: gibench has its own, and cameras that it cannot use are left out."""
+
 
 @cache
 def shipped() -> frozenset[str]:
@@ -21,6 +24,8 @@ def shipped() -> frozenset[str]:
 def check_plugins(root: Node) -> None:
     """Raises SceneFileError for the first plugin that Mitsuba does not have."""
     for node in root.everything():
+        if node.tag in OURS:
+            continue
         if node.tag in PLUGINS and node.get("type") is not None and node.type not in shipped():
             near = difflib.get_close_matches(node.type, shipped(), n=3)
             hint = f"did you mean {' or '.join(near)}?" if near else "it has no counterpart in Mitsuba 3"

@@ -126,6 +126,38 @@ def test_a_ply_file_whose_faces_or_counts_are_wrong(tmp_path, content, says):
         import_scene(scene)
 
 
+@pytest.mark.parametrize(
+    ("properties", "face", "says"),
+    [
+        (
+            "property list uchar int vertex_indices\nproperty float quality\n",
+            struct.pack("<B3if", 3, 0, 1, 8, 0.5),
+            "vertex 8",
+        ),
+        (
+            "property uchar flag\nproperty list uchar uint vertex_index\n",
+            struct.pack("<BB3I", 1, 3, 0, 1, 4 * 10**9),
+            "vertex 4000000000",
+        ),
+        (
+            "property list uchar int vertex_indices\nproperty list uchar float texcoord\n",
+            struct.pack("<B3iB2f", 3, 0, 1, 7, 2, 0, 0),
+            "vertex 7",
+        ),
+        ("property list uchar int vertex_indices\n", struct.pack("<B", 250), "250 corners"),
+    ],
+)
+def test_faces_with_more_than_corners(tmp_path, properties, face, says):
+    header = (
+        "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+        f"property float z\nelement face 1\n{properties}end_header\n"
+    )
+    (tmp_path / "a.ply").write_bytes(header.encode() + CORNERS + face)
+    scene = written(tmp_path, '<shape type="ply"><string name="filename" value="a.ply"/></shape>')
+    with pytest.raises(SceneFileError, match=says):
+        import_scene(scene)
+
+
 def serialized(corner: int, *, announced: int = 1) -> bytes:
     packed = struct.pack("<I", 0x1000) + b"name\0" + struct.pack("<QQ", 3, announced) + CORNERS
     packed += struct.pack("<3I", 0, 1, corner)

@@ -584,3 +584,22 @@ def test_what_a_film_and_an_integrator_ask_for_is_named_where_it_is_left_out(tmp
         tmp_path, body.replace("true", "false") + film.format(0, 64) + "</sensor>", version="3.0.0"
     )
     assert not [c for c in changes if c.loss]
+
+
+def test_the_texture_of_a_normal_map(tmp_path):
+    from .files import image
+
+    image(tmp_path / "n.png")
+    bitmap = '<texture type="bitmap" name="normals"><string name="filename" value="n.png"/></texture>'
+    root, changes = upgraded(
+        tmp_path, shape_of(f'<bsdf type="normalmap">{bitmap}<bsdf type="diffuse"/></bsdf>')
+    )
+    assert "normal_maps" in rules_of(changes)
+    assert one(root, "texture").get("name") == "normalmap"
+    assert one(root, "texture").value("raw") == "true"
+
+
+@pytest.mark.parametrize("tag", ["sensor", "integrator"])
+def test_what_is_left_out_or_replaced_may_be_unknown(tmp_path, tag):
+    root, _ = upgraded(tmp_path, f'<{tag} type="nobody_knows"><sampler type="ldsampler"/></{tag}>{SQUARE}')
+    assert one(root, "shape").type == "rectangle"

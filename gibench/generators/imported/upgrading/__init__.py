@@ -58,6 +58,7 @@ LEGACY: tuple[Rule, ...] = (
     surfaces.mixtures,
     surfaces.coatings,
     surfaces.translucent,
+    surfaces.normal_maps,
     surfaces.distributions,
     textures.scaled_textures,
     textures.bitmap_gamma,

@@ -183,6 +183,21 @@ def translucent(root: Node, note: Note) -> None:
         note(node, "difftrans is principledthin", loss=True)
 
 
+def normal_maps(root: Node, note: Note) -> None:
+    """The texture of a `normalmap`, which had any name, is called normalmap; it holds directions, not colours."""
+    by_id = {node.get("id"): node for node in root.everything() if node.tag != "ref" and node.get("id")}
+    for node in plugins(root, "bsdf", "normalmap"):
+        for part in node.nodes("texture", "ref"):
+            target = by_id.get(part.get("id"), part) if part.tag == "ref" else part
+            if target.tag != "texture":
+                continue
+            if part.get("name") != "normalmap":
+                part.set("name", "normalmap")
+                note(part, "the texture of a normalmap is called normalmap")
+            if target.type == "bitmap" and target.property("raw") is None:
+                target.append(setting(target, "boolean", "raw", "true"))
+
+
 def distributions(root: Node, note: Note) -> None:
     """Microfacet distributions that are gone become the nearest: phong is beckmann, as (Ashikhmin) is ggx."""
     for node in old(root):
