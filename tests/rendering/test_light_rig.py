@@ -139,11 +139,11 @@ def test_moves_and_swaps_compile_no_kernel_and_record_nothing_anew():
 
     gc.collect()  # scenes of other tests that die in between change what kernels call
     rig = LightRig(load_dict(box("metal")))
-    replay = Replay(rig.scene, partial(trace_rows, rig.scene))
+    replay = Replay(rig.scene, partial(trace_rows, rig.scene, 8, ("full",)))
     numbers = [dr.opaque(mi.UInt32, n) for n in (1, 0, 16)]
 
     def frame():
-        return np.array(replay(camera_arrays(CAMERA, (16, 16)), *numbers, 256, 16)["diffuse"]).mean()
+        return np.array(replay(camera_arrays(CAMERA, (16, 16)), *numbers, 256, 16)["full"]).mean()
 
     rng = np.random.default_rng(0)
 

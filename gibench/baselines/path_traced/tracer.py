@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
-from typing import Any
+from typing import Any, ClassVar
 
 import drjit as dr
 import mitsuba as mi
@@ -29,13 +29,15 @@ LANES = 1 << 22
 """Paths in flight at once, so that 32 samples of a large frame need no more memory than 2 of them."""
 
 GUIDES = ("albedo", "normal")
-IMAGES = ("emission", "diffuse", "specular", *GUIDES)
 
 
 def trace_rows(
-    scene: Scene, max_depth: int, camera, seed, first, width, pixels: int, spp: int
+    scene: Scene, max_depth: int, parts: tuple[str, ...], camera, seed, first, width, pixels: int, spp: int
 ) -> dict[str, Any]:
-    """IMAGES of rows of a frame, each mi.Color3f of `pixels` lanes. first: row. pixels, spp: how many."""
+    """GUIDES, "full" and other parts of rows of a frame, each mi.Color3f of `pixels` lanes.
+
+    first: row. pixels, spp: how many.
+    """
     # Independent samples: strata make frames that are denoised no better, and each size of them is a kernel.
     sampler = IndependentSampler()
     sampler.independent.seed(seed, pixels * spp)
@@ -52,13 +54,12 @@ def trace_rows(
         portals=scene.portals,
         layers=scene.layers,
     )
-    values: dict[str, Any] = {
-        "emission": path.emission,
-        "diffuse": path.direct_diffuse + path.indirect_diffuse,
-        "specular": path.direct_specular + path.indirect_specular,
-        "albedo": path.albedo,
-        "normal": path.normal,
-    }
+    indirect = path.indirect_diffuse + path.indirect_specular
+    specular = path.direct_specular + path.indirect_specular
+    lit = path.emission + path.direct_diffuse + path.indirect_diffuse + specular
+    images = {"full": lit, "specular": specular, "indirect": indirect}
+    values: dict[str, Any] = {name: image for name, image in images.items() if name in ("full", *parts)}
+    values |= {"albedo": path.albedo, "normal": path.normal}
     # A path that overflows counts as black. Shares are summed, so that huge radiance does not overflow on the way.
     finite = dr.all(dr.isfinite(sum(values.values())))
     share = dr.rcp(dr.opaque(mi.Float, spp))
@@ -73,6 +74,9 @@ def trace_rows(
 class PathTracer:
     """Method `path-traced`; nothing is prepared."""
 
+    max_depth: ClassVar[int | None] = None
+    """Scattering events of a path; None for as many as the light of the site has."""
+
     def __init__(self, settings: Mapping[str, Setting]) -> None:
         """settings: spp, denoise."""
         self.adjust(settings)
@@ -83,25 +87,34 @@ class PathTracer:
 
     def prepare(self, site: Site) -> None:
         """Keep the scene."""
-        self._kernel = Replay(site.scene, partial(trace_rows, site.scene, site.max_depth))
+        self._parts = [part for part in ("full", "specular", "indirect") if part in ("full", *site.parts)]
+        depth = site.max_depth if self.max_depth is None else self.max_depth
+        self._kernel = Replay(site.scene, partial(trace_rows, site.scene, depth, tuple(self._parts)))
 
     def render(self, view: View, stages: Stages) -> Prediction:
-        """Trace, then denoise the image as a whole, as a renderer shows it, and the specular part once more.
+        """Trace, then denoise the image as a whole, as a renderer shows it, and each part that is scored once more.
 
         The sum of lobes denoised apart is worse below 8 paths a pixel: what one lacks is what the other has noise in.
         """
+        parts, _ = self.images(view, stages)
+        return Prediction(parts["full"], parts.get("specular"), indirect=parts.get("indirect"))
+
+    def images(self, view: View, stages: Stages) -> tuple[dict[str, Any], Any]:
+        """Parts of a frame, denoised where that is set, and its albedo: (H, W, 3)."""
         with stages.stage("ray casting"):
-            images = self._traced(view)
-            color = images["emission"] + images["diffuse"] + images["specular"]
-            color, specular = (averaged(image, view.resolution) for image in (color, images["specular"]))
+            traced = self._traced(view)
+            parts: dict[str, Any] = {part: averaged(traced[part], view.resolution) for part in self._parts}
+            guides = {name: averaged(traced[name], view.resolution) for name in GUIDES}
         if self._denoise:
             with stages.stage("denoising"):
-                guides = {name: np.asarray(averaged(images[name], view.resolution)) for name in GUIDES}
-                color, specular = (denoise(np.asarray(image), **guides) for image in (color, specular))
-        return Prediction(color, specular)
+                read = {name: np.asarray(image) for name, image in guides.items()}
+                parts = {
+                    part: mi.TensorXf(denoise(np.asarray(image), **read)) for part, image in parts.items()
+                }
+        return parts, guides["albedo"]
 
     def _traced(self, view: View) -> dict[str, Any]:
-        """IMAGES as mi.Color3f with a lane a pixel, means over its samples."""
+        """What `trace_rows` gives with a lane a pixel, means over its samples."""
         width, height = view.resolution
         camera = camera_arrays(view.camera, view.resolution)
         rows = max(LANES // (width * self._spp), 1)
@@ -117,5 +130,5 @@ class PathTracer:
             return parts[0]
         return {
             name: mi.Color3f(*(dr.concat([part[name][c] for part in parts]) for c in range(3)))
-            for name in IMAGES
+            for name in parts[0]
         }

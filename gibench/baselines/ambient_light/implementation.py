@@ -1,0 +1,75 @@
+"""The method `ambient`: direct light plus a constant times albedo, the constant fitted on the training frames."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gibench.baselines.direct_light.tracer import DirectLight
+from gibench.baselines.method import MethodError, Prediction, Site, Training, View
+from gibench.baselines.stages import Stages
+
+CONSTANT = "ambient.json"
+
+
+def fitted(frames: Iterable[tuple[NDArray[Any], NDArray[Any], float]]) -> NDArray[np.float64]:
+    """The constant c (3,), W·m⁻²·sr⁻¹, that makes c · albedo most like indirect light, in the sense of least squares.
+
+    frames: indirect radiance (H, W, 3), albedo (H, W, 3) and exposure of each. Differences are of exposed radiance, so
+    that a frame that is lit a hundred times brighter does not decide alone. 0 where nothing has albedo.
+    """
+    products, squares = np.zeros(3), np.zeros(3)
+    for indirect, albedo, exposure in frames:
+        weight = exposure**2
+        products += weight * np.sum(indirect * albedo, axis=(0, 1), dtype=np.float64)
+        squares += weight * np.sum(np.square(albedo), axis=(0, 1), dtype=np.float64)
+    return np.divide(products, squares, out=np.zeros(3), where=squares > 0)
+
+
+class AmbientLight(DirectLight):
+    """See `gibench.baselines.ambient_light.METHOD`."""
+
+    def train(self, training: Training) -> None:
+        """Fit the constant."""
+        if not len(training.views):
+            raise MethodError("ambient fits its constant on training frames, but there are none")
+
+        def parts() -> Iterable[tuple[NDArray[Any], NDArray[Any], float]]:
+            for frame in training.views:
+                read = frame.read("indirect_diffuse", "indirect_specular", "albedo")
+                indirect = read["indirect_diffuse"] + read["indirect_specular"]
+                exposure = float(frame.row["exposure"])
+                yield indirect, read["albedo"], exposure if np.isfinite(exposure) else 1.0
+
+        constant = fitted(parts())
+        (training.folder / CONSTANT).write_text(json.dumps(constant.tolist()), encoding="utf-8")
+
+    def prepare(self, site: Site) -> None:
+        """Read the constant."""
+        super().prepare(site)
+        if site.weights is None:
+            raise MethodError("ambient has not been trained: it needs the folder that `train` filled")
+        self._constant = _read(site.weights)
+
+    def render(self, view: View, stages: Stages) -> Prediction:
+        """Direct light, and the constant times albedo."""
+        parts, albedo = self.images(view, stages)
+        ambient = albedo * type(albedo)(self._constant.astype(np.float32))
+        return Prediction(parts["full"] + ambient, indirect=ambient)
+
+
+def _read(folder: Path) -> NDArray[np.float64]:
+    try:
+        constant = np.array(json.loads((folder / CONSTANT).read_text(encoding="utf-8")), dtype=np.float64)
+    except (OSError, ValueError, TypeError) as problem:
+        raise MethodError(
+            f"the constant in {folder} cannot be read ({problem}): remove that folder"
+        ) from None
+    if constant.shape != (3,) or not np.isfinite(constant).all():
+        raise MethodError(f"the constant in {folder} is not three numbers: remove that folder")
+    return constant
