@@ -4,9 +4,11 @@ import math
 import pytest
 
 from gibench.benchmarks.errors import TrackError
+from gibench.benchmarks.orders import ordered_methods
 from gibench.benchmarks.track import CHANNELS_OF, MOVING, check_track, load_track, track_names
 from gibench.generators.rooms import sample_room
 from gibench.rendering.render import MAX_DEPTH
+from tests.benchmarks import toys
 from tests.benchmarks.conftest import TINY
 
 
@@ -18,7 +20,7 @@ def changed(change) -> dict:
 
 def test_the_presets_of_the_walkthrough_are_what_the_issue_asks_for():
     track = load_track("walkthrough")
-    assert track_names() == ("walkthrough",)
+    assert track_names() == ("moving-light", "relight", "unseen-rooms", "walkthrough")
     smoke, cpu, paper = (track.preset(name) for name in ("smoke", "cpu", "paper"))
     assert smoke.rooms == 1
     assert min(smoke.recipe("reference").resolution) >= 31  # what LPIPS needs
@@ -96,3 +98,73 @@ def test_unknown_tracks_presets_and_files(tmp_path):
     (tmp_path / "bad.toml").write_text("id = ")
     with pytest.raises(TrackError, match=r"bad\.toml is no valid TOML"):
         load_track(str(tmp_path / "bad.toml"))
+
+
+def test_the_presets_of_the_tracks_with_other_light_and_other_rooms():
+    """What is trained on and what is scored at the size of two cores."""
+
+    def sizes(name: str) -> tuple[list[int], list[int], tuple[int, int]]:
+        preset = load_track(name).preset("cpu")
+        training, reference = preset.recipe("training"), preset.recipe("reference")
+        return (
+            [training.rooms, len(training.rendered_views())],
+            [len(reference.rendered_views(room=room)) for room in range(reference.rooms)],
+            training.resolution,
+        )
+
+    assert sizes("moving-light") == ([2, 1000], [60 + 24 + 24] * 2, (128, 128))
+    assert sizes("unseen-rooms") == ([200, 4], [3 + 16] * 4 + [3] * 20, (192, 128))
+    for name in ("moving-light", "relight", "unseen-rooms"):
+        track = load_track(name)
+        assert track.parts == ("full", "indirect")
+        assert {"mae", "mse", "psnr", "ssim", "lpips_alex"} <= set(track.metrics)
+        assert "warping_error" in track.sequence_metrics
+
+
+ROOMS = {"prepare_on": "rooms"}
+OWN = {"training_rooms": 3, "training_seed": 9}
+
+
+@pytest.mark.parametrize(
+    ("track", "preset", "says"),
+    [
+        ({}, OWN, 'training_rooms and training_seed need prepare_on = "rooms"'),
+        (ROOMS, {}, 'prepare_on = "rooms" needs training, training_rooms and training_seed'),
+        (
+            ROOMS,
+            OWN | {"training_seed": 4},
+            "the rooms to train on would be those that are scored; choose another",
+        ),
+        (ROOMS, OWN | {"training": None}, 'prepare_on = "rooms" needs training'),
+        (
+            {},
+            {"budget": {"training": 60, "prepare": 60, "render": 5}},
+            r"training \(60 s\) must be below prepare \(60 s\), after which the process is killed",
+        ),
+    ],
+)
+def test_trainings_that_cannot_be_are_refused(track, preset, says):
+    def change(t, p):
+        t.update(track)
+        p.update(preset)
+
+    with pytest.raises(TrackError, match=says):
+        check_track(changed(change))
+
+
+def test_rooms_to_train_on_are_others_than_those_that_are_scored():
+    track = check_track(changed(lambda t, p: (t.update(ROOMS), p.update(OWN))))
+    preset = track.preset("tiny")
+    training, reference = preset.recipe("training"), preset.recipe("reference")
+    assert (training.rooms, training.seed, training.rendered, training.path) == (3, 9, "all", "stills")
+    assert (reference.rooms, reference.seed) == (1, 4)
+    scenes = preset.recipe("training", scenes={"scenes": ("nowhere.xml",)})
+    assert scenes == training
+
+
+def test_a_method_that_trains_where_there_is_nothing_to_train_on():
+    track = check_track(changed(lambda t, p: p.pop("training")))
+    for method in (toys.found("Plain", trains=True), toys.CONSTANT):
+        with pytest.raises(TrackError, match="trains, but walkthrough, preset tiny, has no views"):
+            ordered_methods(track, "tiny", [method], {})
+    assert ordered_methods(track, "tiny", [toys.PLAIN], {})
