@@ -123,6 +123,23 @@ class Results:
         return pd.DataFrame(rows, columns=["result", "stage", "ms_median", "ms_p95"])
 
     @cached_property
+    def curves(self) -> pd.DataFrame:
+        """A row a look at the held-out error of a training: result, training, step, seconds, error.
+
+        training: numbers those of a result, from 0. What is trained on rooms stands with every result that uses it.
+        """
+        import pandas as pd
+
+        rows = [
+            (id, number, look["step"], look["seconds"], look["error"])
+            for id, record in self._good()
+            for number, curve in enumerate(record["prepare"].get("curves", []))
+            for look in curve
+        ]
+        columns = {"result": "str", "training": "int64", "step": "int64", "seconds": "float64"}
+        return pd.DataFrame(rows, columns=[*columns, "error"]).astype(columns | {"error": "float64"})
+
+    @cached_property
     def frames(self) -> pd.DataFrame:
         """A row a frame, metric and part: result, frame, ms, metric, part ("full", "specular"), value.
 

@@ -194,10 +194,11 @@ def compare(
         Path | None, typer.Option("--in", help="Compare two methods of this run.", show_default=False)
     ] = None,
     metric: Annotated[str, typer.Option(help="Of two folders: the metric to compare by.")] = "rmse_display",
-    part: Annotated[str, typer.Option(help="Of two folders: full or specular.")] = "full",
+    part: Annotated[str, typer.Option(help="Of two folders: full, specular or indirect.")] = "full",
 ) -> None:
     """Compare two runs, or two methods of one run, on the same frames."""
     from gibench.benchmarks.errors import ResultsError
+    from gibench.benchmarks.report.source import PARTS
     from gibench.benchmarks.results import load
     from gibench.cli import bench_telling as telling
     from gibench.metrics import metric as descriptor
@@ -206,18 +207,16 @@ def compare(
         telling.tell_methods_compared(load(within), first, second)
         return
     descriptor(metric)
-    if part not in ("full", "specular"):
-        raise ResultsError(f"--part: '{part}' is not allowed; allowed are full and specular")
+    if part not in PARTS:
+        raise ResultsError(f"--part: '{part}' is not allowed; allowed are {', '.join(PARTS)}")
     telling.tell_runs_compared(load(first), load(second), metric, part)
 
 
 @app.command("report")
 def report(
     results: Annotated[
-        Path,
-        typer.Argument(
-            metavar="RESULTS", help="The folder of a run, or a packed report.", show_default=False
-        ),
+        list[Path],
+        typer.Argument(metavar="RESULTS...", help="Folders of runs, or a packed report.", show_default=False),
     ],
     out: Annotated[Path | None, typer.Option(help="Where to.", show_default=False)] = None,
     archive: Annotated[
@@ -225,7 +224,7 @@ def report(
         typer.Option(help="Pack page, images, plots and tables into this ZIP file.", show_default=False),
     ] = None,
 ) -> None:
-    """Write the leaderboard page, CSV files, tables and plots of a run, or unpack those that were packed."""
+    """Write one page, CSV files, tables and plots of one run or more, or unpack those that were packed."""
     from gibench.cli.bench_reporting import write_and_tell
 
     write_and_tell(results, out, archive)

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 from gibench.cli.output import say
 from gibench.errors import GibenchError
 
 
-def write_and_tell(results: Path, out: Path | None, archive: Path | None) -> None:
+def write_and_tell(results: Sequence[Path], out: Path | None, archive: Path | None) -> None:
     """Write what was asked for and say where it is.
 
-    results: a run, or a file that `archive` made. out: a folder for the page. archive: a file to pack it into. Raises
+    results: runs, or a file that `archive` made. out: a folder for the page. archive: a file to pack it into. Raises
     TrackError for options that contradict each other, ReportError, ResultsError, or GibenchError where the disk
     refuses.
     """
@@ -22,16 +23,17 @@ def write_and_tell(results: Path, out: Path | None, archive: Path | None) -> Non
     from gibench.benchmarks.results import load
 
     try:
-        if results.is_file():
-            if out is None or archive is not None:
+        packed = next((path for path in results if path.is_file()), None)
+        if packed is not None:
+            if out is None or archive is not None or len(results) > 1:
                 raise TrackError(
-                    f"{results} is a packed report: name a new folder for it with --out, and no --archive"
+                    f"{packed} is a packed report: name it alone, a new folder for it with --out, and no --archive"
                 )
-            say(str(unpack(results, out)))
+            say(str(unpack(packed, out)))
             return
         if out is None and archive is None:
             raise TrackError("name a folder with --out, or a file with --archive, or both")
-        loaded = load(results)
+        loaded = [load(folder) for folder in results]
         if out is not None:
             write_report(loaded, out)
             say(str(out / "index.html"))

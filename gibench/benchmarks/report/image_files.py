@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gibench.benchmarks.report.runs import image_part
 from gibench.benchmarks.report.source import ReportSource
 from gibench.metrics import flip, tone_map
 
@@ -80,6 +81,7 @@ def write_images(source: ReportSource, results: pd.DataFrame, out: Path) -> int:
     results: those that are done, with columns result and scene. Files are named as `image_name` says.
     """
     done = source.frames[["result", "frame", "part"]].drop_duplicates()
+    done = done[done["part"] == done["part"].map(image_part)]
     jobs = done.merge(results[["result", "scene"]], on="result").groupby(["scene", "frame", "part"])["result"]
 
     def write(job: tuple[Any, Any]) -> int:

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from gibench.benchmarks.report.image_files import STEPS_PER_STOP, TOE
-from gibench.benchmarks.report.source import PARTS, ReportSource
+from gibench.benchmarks.report.runs import part_title
+from gibench.benchmarks.report.source import ReportSource
 from gibench.benchmarks.report.summary import Summary
 from gibench.benchmarks.report.tables import stage_times
 from gibench.benchmarks.report.wording import metric_title
@@ -51,7 +52,7 @@ def write_page(source: ReportSource, summary: Summary, out: Path) -> Path:
         style=(assets / "page.css").read_text(encoding="utf-8"),
         scripts=[(assets / name).read_text(encoding="utf-8") for name in SCRIPTS],
         data=_inline(page_data(source, summary)),
-        parts={part: PARTS.get(part, part) for part in summary.parts},
+        parts={part: part_title(part) for part in summary.parts},
     )
     path = out / "index.html"
     write_whole(path, text.encode())
@@ -75,6 +76,7 @@ def page_data(source: ReportSource, summary: Summary) -> dict[str, Any]:
         "tracks": summary.tracks,
         "machines": summary.machines,
         "parts": summary.parts,
+        "partTitles": {part: part_title(part) for part in summary.parts},
         "metrics": [
             {
                 "name": name,

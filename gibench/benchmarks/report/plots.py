@@ -25,7 +25,8 @@ from gibench.benchmarks.report.plot_style import (
     set_log_axis,
     tick_text,
 )
-from gibench.benchmarks.report.source import PARTS, ReportSource
+from gibench.benchmarks.report.runs import image_part, part_title
+from gibench.benchmarks.report.source import ReportSource
 from gibench.benchmarks.report.summary import Summary
 from gibench.benchmarks.report.tables import stage_times
 from gibench.benchmarks.report.wording import metric_title, number, printable
@@ -92,7 +93,7 @@ def _written(source: ReportSource, summary: Summary, out: Path) -> list[Path]:
     written: list[Path] = []
     for track in summary.tracks:
         prefix = f"{track}-" if len(summary.tracks) > 1 else ""
-        for part in summary.parts:
+        for part in (part for part in summary.parts if part == image_part(part)):
             for metric in plotted_metrics(summary, part):
                 for cost in COSTS:
                     machines = summary.machines if cost.timed else [None]
@@ -196,7 +197,7 @@ def _about(summary: Summary, track: str, part: str, machine: str | None) -> str:
         if rooms > 1
         else "one room, 95 % intervals over its frames"
     )
-    words = [PARTS.get(part, part), f"track {_short(track)}", over]
+    words = [part_title(part), f"track {_short(track)}", over]
     if machine:
         words.append(machine if len(machine) < 40 else machine[:38] + "…")
     return "  ·  ".join(words)
@@ -405,7 +406,7 @@ def error_along_path(summary: Summary, track: str, part: str, metric: str) -> Fi
     names = [_entry_name(summary, entry) for entry in chosen]
     right = _widest(figure, [*names, NOISE_BELOW]) + 0.3
     title = f"{metric_title(metric)} along the path, the best setting of each method"
-    _title(figure, title, f"{PARTS.get(part, part)}  ·  track {track}")
+    _title(figure, title, f"{part_title(part)}  ·  track {track}")
     for order, scene in enumerate(scenes):
         bottom = height - 0.62 - (order + 1) * (panel + gap) + gap - 0.1
         axes = _panel(figure, (0.68, bottom, WIDTH - 0.68 - right, panel))

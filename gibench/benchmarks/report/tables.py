@@ -14,7 +14,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gibench.benchmarks.report.csv_files import short_reason
-from gibench.benchmarks.report.source import PARTS, PREPARATION, ReportSource
+from gibench.benchmarks.report.runs import APART, image_part, part_title
+from gibench.benchmarks.report.source import PREPARATION, ReportSource
 from gibench.benchmarks.report.summary import Summary
 from gibench.benchmarks.report.wording import MISSING, metric_title, number, printable, seconds, size
 from gibench.datasets.files import write_whole
@@ -96,8 +97,12 @@ def tables(source: ReportSource, summary: Summary) -> dict[str, Table]:
     for track in summary.tracks:
         prefix = f"{track}-" if len(summary.tracks) > 1 else ""
         for part in summary.parts:
-            made[f"{prefix}errors-{part}"] = errors(summary, track, part)
-            made[f"{prefix}errors-{part}-by-scene"] = errors_by_scene(summary, track, part)
+            if not _of_track(summary, track, part):
+                continue
+            name = f"{prefix}errors-{part.replace(APART, '-')}"
+            made[name] = errors(summary, track, part)
+            if part == image_part(part):
+                made[f"{name}-by-scene"] = errors_by_scene(summary, track, part)
         made[f"{prefix}preparation"] = preparation(summary, track)
         made[f"{prefix}frame-time"] = frame_time(source, summary, track)
     if (summary.results["status"] != "ok").any():
@@ -127,7 +132,7 @@ def errors(summary: Summary, track: str, part: str) -> Table:
     ]
     groups.append((None, [[Cell("noise floor of the reference"), *floors]]))
     caption = (
-        f"{PARTS.get(part, part)}, track {track}: means over all rooms and their 95 % intervals over rooms and seeds. "
+        f"{part_title(part)}, track {track}: means over all rooms and their 95 % intervals over rooms and seeds. "
         "The best of a column is bold. "
     ) + _directions(metrics)
     return Table(caption, ["Method", *map(metric_title, metrics)], groups)
@@ -156,7 +161,7 @@ def errors_by_scene(summary: Summary, track: str, part: str) -> Table:
         rows.append([Cell("noise floor"), *noise])
         groups.append((scene, rows))
     caption = (
-        f"{PARTS.get(part, part)} by scene, track {track}: means over the frames of the path. "
+        f"{part_title(part)} by scene, track {track}: means over the frames of the path. "
         "The best of a scene is bold. "
     ) + _directions(metrics)
     return Table(caption, ["Scene", "Method", *map(metric_title, metrics)], groups, words=2)

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
+from gibench.benchmarks.report.runs import Runs
 from gibench.benchmarks.report.source import ReportError, ReportSource
+from gibench.benchmarks.results import Results
 
 
-def write_report(results: ReportSource, out: Path, *, against: str | None = None) -> Path:
+def write_report(
+    results: ReportSource | Results | Sequence[Results], out: Path, *, against: str | None = None
+) -> Path:
     """Write leaderboard.csv, frames.csv, stages.csv and more, tables/, plots/, and index.html with its images.
+
+    results: a run, or several, of one track or of several.
 
     against: the label of a setting, or a method with one setting, that differences are taken against.
 
@@ -31,6 +38,10 @@ def write_report(results: ReportSource, out: Path, *, against: str | None = None
     from gibench.benchmarks.report.summary import summarise
     from gibench.benchmarks.report.tables import write_tables
 
+    if isinstance(results, Results):
+        results = Runs([results])
+    elif isinstance(results, Sequence):
+        results = Runs(results)
     summary = summarise(results, against=against)
     for folder in (out, out / "tables", out / "plots"):
         folder.mkdir(parents=True, exist_ok=True)

@@ -19,6 +19,7 @@ function showHead() {
 
 function fillFilters() {
   options($("track"), data.tracks.map((track) => [track, track]), state.track);
+  fillParts();
   options($("on-machine"), [["", "all machines"], ...data.machines.map((machine) => [machine, machine])], "");
   $("machine-filter").hidden = !severalMachines;
   fillScenes();
@@ -30,8 +31,17 @@ function fillScenes() {
   state.scene = options($("scene"), [["", "all rooms"], ...scenes], state.scene);
 }
 
+const ofTrack = () => data.entries.filter((entry) => entry.track === state.track);
+
+function fillParts() {
+  const scored = new Set(ofTrack().flatMap((entry) => Object.keys(entry.scores)).map((name) => name.split("/")[0]));
+  const known = Object.entries(data.partTitles).filter(([part]) => scored.has(part) || !scored.size);
+  if (!known.some(([part]) => part === state.part)) state.part = known[0][0];
+  options($("part"), known, state.part);
+}
+
 function fillMetrics() {
-  const scored = new Set(data.entries.flatMap((entry) => Object.keys(entry.scores)).filter((name) => name.startsWith(`${state.part}/`)));
+  const scored = new Set(ofTrack().flatMap((entry) => Object.keys(entry.scores)).filter((name) => name.startsWith(`${state.part}/`)));
   const known = data.metrics.filter((metric) => scored.has(`${state.part}/${metric.name}`));
   const before = state.metric;
   state.metric = options($("metric"), known.map((metric) => [metric.name, metric.title]), state.metric) || null;
@@ -53,7 +63,7 @@ function showCharts() {
 function on(id, type, act) { $(id).addEventListener(type, (event) => act(event.target)); }
 
 function listen() {
-  on("track", "change", ({ value }) => { state.track = value; fillScenes(); showAll(); });
+  on("track", "change", ({ value }) => { state.track = value; fillScenes(); fillParts(); fillMetrics(); showAll(); });
   on("scene", "change", ({ value }) => { state.scene = value; showAll(); });
   on("part", "change", ({ value }) => { state.part = value; fillMetrics(); showAll(); });
   on("metric", "change", ({ value }) => { state.metric = value; state.sort = { key: "mean", down: metricOf(value).higher }; showBoard(); tell(); showCharts(); });

@@ -3,7 +3,7 @@ const REFERENCE = "reference";
 const view = { scene: 0, frame: 0, left: REFERENCE, right: "", exposure: 0, errors: false, range: 1, zoom: 1, x: 0.5, y: 0.5, split: 50 };
 const section = $("images"), split = $("split"), divider = $("divider");
 const MOST_ZOOM = 64;
-const fileOf = (kind, of, frame) => `${kind}/${of}/${String(frame).padStart(4, "0")}-${state.part}.js`;
+const fileOf = (kind, of, frame) => `${kind}/${of}/${String(frame).padStart(4, "0")}-${state.part.split(":")[0]}.js`;
 
 // Settings that have images of this room and part.
 function shown() {
