@@ -40,10 +40,11 @@ class Checkpoint:
     """
 
     def __init__(
-        self, path: Path, owner: Mapping[str, str | int | float | bool], *, every: float = EVERY_SECONDS
+        self, path: Path, owner: Mapping[str, str | int | float | bool], *, every: float | None = None
     ) -> None:
-        """every: seconds from one write to the next; 0: after every step."""
-        self.path, self.owner, self.every = path, dict(owner), every
+        """every: seconds from one write to the next, EVERY_SECONDS unless given; 0: after every step."""
+        self.path, self.owner = path, dict(owner)
+        self.every = EVERY_SECONDS if every is None else every
         self._written = time.monotonic()
 
     @property

@@ -30,7 +30,7 @@ class Trained:
 
     weights: those with the smallest held-out error, the earliest of equal ones, by network and name. best: the look at
     them; its step is 0 where the networks as they were built are the best. planned: steps that learning rates were laid
-    out for, steps: those that were made. seconds: in all, runs that were cut off included; waited: for data, of these.
+    out for, steps: those that were made. seconds: in all; of these, before: in runs cut off, waited: for data.
     """
 
     weights: Weights
@@ -39,6 +39,7 @@ class Trained:
     steps: int
     planned: int
     seconds: float
+    before: float
     waited: float
     ended: Ended
 

@@ -79,7 +79,7 @@ class _Run:
         self.owner: dict[str, Any] = {"seed": seed, **machine(self.device)}
         self.owner |= {f"budget {name}": value for name, value in asdict(budget).items() if value is not None}
         self.step, self.planned = 0, budget.steps
-        self.seconds = self.waited = 0.0
+        self.seconds = self.before = self.waited = 0.0
         self.curve: list[Look] = []
         self.best: Look
         self.weights: Weights
@@ -95,12 +95,13 @@ class _Run:
         state = self.checkpoint.read(self.owner, self.device) if self.checkpoint else None
         if state is not None:
             self._load(state)
-            self.started = time.perf_counter() - self.seconds
+            self.before = self.seconds
+            self.started = time.perf_counter() - self.before
         else:
             self._look()
             if not math.isfinite(self.best.error):
                 raise TrainingError(f"the held-out error before the first step is {self.best.error}")
-        self.before = self._now()
+        self.begun = self._now()
 
     def go_on(self, batches: Batches, tell: Tell, write: Write) -> None:
         """To the end."""
@@ -218,6 +219,7 @@ class _Run:
             steps=self.step,
             planned=self.planned or self.step,
             seconds=self.seconds,
+            before=self.before,
             waited=self.waited,
             ended=self.ended,
         )
@@ -233,7 +235,7 @@ class _Run:
         if self.planned:
             share = self.step / self.planned
             if self.made > WARM:
-                left.append((self.planned - self.step) * (spent - self.before) / self.made)
+                left.append((self.planned - self.step) * (spent - self.begun) / self.made)
         if budget.seconds:
             share = max(share, spent / budget.seconds)
             left.append(budget.seconds - spent)

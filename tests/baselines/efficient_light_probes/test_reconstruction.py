@@ -12,6 +12,7 @@ from gibench.baselines.efficient_light_probes import METHOD, SEARCH, training
 from gibench.baselines.efficient_light_probes.reconstruction import as_image
 from gibench.baselines.method import MethodError, View
 from gibench.baselines.stages import Stages
+from gibench.baselines.training import artifacts, checkpoints
 from gibench.datasets.loading import Frame
 from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.render import render_frame
@@ -124,32 +125,40 @@ def test_without_temporal_parts_a_frame_stands_alone(where):
 def test_the_network_is_trained_once_and_every_setting_that_does_not_bake_has_it(where, monkeypatch):
     first = made(METHOD, where)
     expected = first.render(path()[0], Stages()).color
-    monkeypatch.setattr(training.Training, "run", lambda *_: pytest.fail("it was trained again"))
+    monkeypatch.setattr(training.Reconstructing, "step", lambda *_: pytest.fail("it was trained again"))
     second = made(METHOD, where, rays=4, steps=5)
     second.adjust(first.settings)
     np.testing.assert_array_equal(second.render(path()[0], Stages()).color, expected)
     assert not list(where.bakes.root.glob(".training*"))
     bake = next(bake for bake in where.bakes.used if bake.kind == "training")
     assert bake.seconds > 0
+    told = artifacts.record(bake.folder)
+    assert told["best"]["step"] in [look["step"] for look in told["curve"]]
+    assert 0 < told["steps"] <= told["planned_steps"]
 
 
 def test_killed_while_it_trains_it_goes_on_and_is_charged_for_all_of_it(where, monkeypatch):
-    real = training.Training._pass
+    real = training.Reconstructing.step
+    monkeypatch.setattr(checkpoints, "EVERY_SECONDS", 0.0)
 
-    def dies(self):
-        if self.epoch == 10:
+    def dies(learner, batch, now):
+        if now.number == 10:
             raise KeyboardInterrupt
-        return real(self)
+        return real(learner, batch, now)
 
-    monkeypatch.setattr(training.Training, "_pass", dies)
+    monkeypatch.setattr(training.Reconstructing, "step", dies)
     with pytest.raises(KeyboardInterrupt):
         made(METHOD, where, fusion="concatenation")
     checkpoint = next(where.bakes.root.glob(".training*.checkpoint"))
-    spent = torch.load(checkpoint)["seconds"]
-    epochs = []
-    monkeypatch.setattr(training.Training, "_pass", lambda self: epochs.append(self.epoch) or real(self))
+    spent = torch.load(checkpoint)["state"]["seconds"]
+    numbers = []
+    monkeypatch.setattr(
+        training.Reconstructing,
+        "step",
+        lambda learner, batch, now: numbers.append(now.number) or real(learner, batch, now),
+    )
     made(METHOD, where, fusion="concatenation")
-    assert epochs[0] == 10
+    assert numbers[0] == 10
     assert not checkpoint.exists()
     assert next(b for b in where.bakes.used[::-1] if b.kind == "training").seconds > spent > 0
 

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
-import io
+from itertools import islice
 
 import numpy as np
 import pytest
 import torch
-from rich.console import Console
 
-from gibench.baselines.efficient_light_probes import training
 from gibench.baselines.efficient_light_probes.examples import STEP, TURN, Example, cameras_before
 from gibench.baselines.efficient_light_probes.network import GUIDES
-from gibench.baselines.efficient_light_probes.training import Plan, Training, scale_of
-from gibench.baselines.method import MethodError
+from gibench.baselines.efficient_light_probes.training import Plan, Reconstructing, scale_of
+from gibench.baselines.training.checkpoints import Checkpoint
+from gibench.baselines.training.errors import CheckpointError
 from gibench.metrics.lpips_weights import weights_state
 from gibench.rendering.camera import PinholeCamera
 
@@ -41,76 +40,83 @@ def example(seed, size=(24, 32), bright=0.0, noise=0.2):
 EXAMPLES = [example(seed) for seed in range(6)]
 
 
-def weights(run):
-    return torch.cat([value.flatten() for value in run.best.values()])
+def learned(examples=EXAMPLES, checkpoint=None, **plan):
+    learner = Reconstructing(examples, dataclasses.replace(PLAN, **plan))
+    return learner, learner.trained(checkpoint)
+
+
+def weights(trained):
+    return torch.cat([value.flatten() for value in trained.weights["network"].values()])
 
 
 def test_it_learns_to_remove_noise():
-    run = Training(EXAMPLES, dataclasses.replace(PLAN, epochs=40))
-    before = run.error()
-    run.run()
-    assert run.best_error < 0.7 * before
-    assert 0 < run.best_epoch <= 40
+    learner, trained = learned(epochs=40)
+    assert trained.best.error < 0.7 * trained.curve[0].error
+    assert 0 < trained.best.step <= 40 * learner.steps_of_epoch
+    assert learner.steps_of_epoch == 3
 
 
 def test_equal_seeds_give_equal_weights_and_others_others():
-    first, second, other = (Training(EXAMPLES, dataclasses.replace(PLAN, seed=seed)) for seed in (3, 3, 4))
-    for run in (first, second, other):
-        run.run()
+    first, second, other = (learned(seed=seed)[1] for seed in (3, 3, 4))
     assert torch.equal(weights(first), weights(second))
     assert not torch.equal(weights(first), weights(other))
 
 
-def test_the_seeds_of_others_are_left_alone():
-    torch.manual_seed(11)
-    expected = torch.rand(1)
-    torch.manual_seed(11)
-    Training(EXAMPLES, PLAN).run()
-    assert torch.rand(1) == expected
-    assert not torch.are_deterministic_algorithms_enabled()
+@pytest.mark.parametrize("number", [1, 10, 15])
+def test_killed_within_an_epoch_it_ends_with_the_same_weights(tmp_path, number):
+    _, whole = learned()
+    killed = Reconstructing(EXAMPLES, PLAN)
+    real = killed.step
 
-
-def test_killed_half_way_it_ends_with_the_same_weights(tmp_path, monkeypatch):
-    whole = Training(EXAMPLES, PLAN)
-    whole.run(tmp_path / "whole")
-
-    killed = Training(EXAMPLES, PLAN)
-    real = killed._pass
-
-    def dies():
-        if killed.epoch == 5:
+    def dies(batch, now):
+        if now.number == number:
             raise KeyboardInterrupt
-        return real()
+        return real(batch, now)
 
-    monkeypatch.setattr(killed, "_pass", dies)
+    killed.step = dies
+    checkpoint = Checkpoint(tmp_path / "checkpoint", {"method": "elp"}, every=0)
     with pytest.raises(KeyboardInterrupt):
-        killed.run(tmp_path / "checkpoint")
-    resumed = Training(EXAMPLES, PLAN)
-    assert resumed.resume(tmp_path / "checkpoint") > 0
-    assert resumed.epoch == 5
-    resumed.run(tmp_path / "checkpoint")
+        killed.trained(checkpoint)
+    _, resumed = learned(checkpoint=checkpoint)
+    assert 0 < resumed.before < resumed.seconds
     assert torch.equal(weights(resumed), weights(whole))
-    assert resumed.best_epoch == whole.best_epoch
+    assert resumed.best.step == whole.best.step
 
 
-def test_without_a_checkpoint_it_begins_at_the_beginning(tmp_path):
-    assert Training(EXAMPLES, PLAN).resume(tmp_path / "none") == 0
+@pytest.mark.parametrize("lpips", [False, True])
+def test_batches_can_begin_within_an_epoch(monkeypatch, lpips):
+    """The window of the perceptual loss comes from the same random numbers, where there is that loss."""
+    monkeypatch.setattr("gibench.baselines.efficient_light_probes.training.build_network", torch.nn.ReLU)
+    learner = Reconstructing(EXAMPLES, dataclasses.replace(PLAN, lpips=lpips))
+    whole = list(islice(learner.batches(0), 12))
+    for first in range(1, 9):
+        for found, expected in zip(islice(learner.batches(first), 4), whole[first:], strict=False):
+            assert [id(one) for one in found.examples] == [id(one) for one in expected.examples]
+            assert (found.windows, found.seen) == (expected.windows, expected.seen)
+    assert [one.seen is not None for one in whole] == [lpips and step % 4 == 0 for step in range(12)]
 
 
 def test_a_damaged_checkpoint_is_named(tmp_path):
     (tmp_path / "checkpoint").write_bytes(b"no weights")
-    with pytest.raises(MethodError, match=r"checkpoint.*remove it"):
-        Training(EXAMPLES, PLAN).resume(tmp_path / "checkpoint")
+    with pytest.raises(CheckpointError, match=r"checkpoint.*remove it"):
+        learned(checkpoint=Checkpoint(tmp_path / "checkpoint", {"method": "elp"}))
 
 
 def test_it_stops_where_the_held_out_view_gets_no_better():
     """What is held out is given without noise: the network that hands it through is the best there is."""
     clean = example(9, noise=0.0)
-    run = Training([*EXAMPLES, clean], dataclasses.replace(PLAN, epochs=40))
-    run.run()
-    assert run.best_epoch == 0
-    assert run.best_error == 0
-    assert run.epoch == 21  # half of the epochs, and the one that is too many
+    learner, trained = learned([*EXAMPLES, clean], epochs=40)
+    assert trained.ended == "patience"
+    assert (trained.best.step, trained.best.error) == (0, 0)
+    assert trained.steps == 21 * learner.steps_of_epoch  # half of the epochs, and the one that is too many
+
+
+@pytest.mark.parametrize(
+    ("epochs", "every", "last"), [(40, 1, 21), (50, 1, 26), (100, 2, 50), (1000, 20, 500)]
+)
+def test_looks_and_patience_are_whole_epochs(epochs, every, last):
+    budget = Reconstructing(EXAMPLES, dataclasses.replace(PLAN, epochs=epochs)).budget
+    assert (budget.steps, budget.look_every, budget.patience) == (3 * epochs, 3 * every, 3 * last)
 
 
 @pytest.mark.parametrize(
@@ -129,10 +135,9 @@ def test_very_bright_highlights_and_black_images_train(lpips):
     bright = [example(seed, bright=1e6) for seed in range(3)]
     black = [dataclasses.replace(one, color=0 * one.color, truth=0 * one.truth) for one in bright]
     for views in (bright, black, [bright[0], black[0]]):
-        run = Training(views, dataclasses.replace(PLAN, epochs=3, lpips=lpips))
-        run.run()
-        assert np.isfinite(run.best_error)
-        assert all(torch.isfinite(value).all() for value in run.network.state_dict().values())
+        learner, trained = learned(views, epochs=3, lpips=lpips)
+        assert np.isfinite(trained.best.error)
+        assert all(torch.isfinite(value).all() for value in learner.network.state_dict().values())
 
 
 def test_a_brighter_scene_of_another_size_trains_alike():
@@ -148,32 +153,16 @@ def test_a_brighter_scene_of_another_size_trains_alike():
         )
         for one in EXAMPLES
     ]
-    runs = [Training(views, PLAN) for views in (EXAMPLES, large)]
-    for run in runs:
-        run.run()
-    assert runs[1].scale.exposure == pytest.approx(runs[0].scale.exposure / 100)
-    assert runs[1].best_error == pytest.approx(runs[0].best_error, rel=1e-2)
+    (first, trained), (second, again) = (learned(views) for views in (EXAMPLES, large))
+    assert second.scale.exposure == pytest.approx(first.scale.exposure / 100)
+    assert again.best.error == pytest.approx(trained.best.error, rel=1e-2)
 
 
-def test_crops_larger_than_the_image_and_images_without_hits(tmp_path):
+def test_crops_larger_than_the_image_and_images_without_hits():
     nothing = dataclasses.replace(EXAMPLES[0], guides=torch.zeros(GUIDES, 24, 32))
-    run = Training([nothing, nothing], dataclasses.replace(PLAN, crop=512, epochs=2))
-    run.run()
+    _, trained = learned([nothing, nothing], crop=512, epochs=2)
     assert scale_of([nothing]).depth == 1
-    assert np.isfinite(run.best_error)
-
-
-def test_a_terminal_gets_a_bar_and_a_file_gets_lines(monkeypatch):
-    for terminal in (True, False):
-        out = io.StringIO()
-        monkeypatch.setattr(
-            training,
-            "Console",
-            lambda *, stderr, to=out, is_it=terminal: Console(file=to, force_terminal=is_it, width=80),
-        )
-        Training(EXAMPLES, dataclasses.replace(PLAN, epochs=2)).run()
-        assert "epoch 2/2" in out.getvalue()
-        assert max(map(len, out.getvalue().splitlines()[-1:])) <= 80 or terminal
+    assert np.isfinite(trained.best.error)
 
 
 def test_earlier_cameras_lie_on_a_line_and_turn_steadily():

@@ -87,7 +87,7 @@ def test_a_damaged_one_is_named_and_runs_no_code(done, content, tmp_path):
             def __reduce__(self):
                 return Path.touch, (tmp_path / "ran",)
 
-        content = pickle.dumps(Evil())
+        content = pickle.dumps(Evil(), protocol=2)
     done.write_bytes(content)
     with pytest.raises(CheckpointError, match="remove it") as problem:
         train(Fit(), points(), BUDGET, seed=0, checkpoint=Checkpoint(done, OWNER))

@@ -190,6 +190,7 @@ def test_seconds_that_were_spent_before_count(tmp_path):
     trained = train(slow(Fit(), 0.02), points(), budget, seed=0, checkpoint=checkpoint)
     assert time.perf_counter() - started < trained.seconds - 0.35
     assert trained.seconds >= 0.9
+    assert 0.35 < trained.before < trained.seconds
 
 
 def test_where_only_seconds_are_given_the_steps_are_planned_and_can_be_repeated():
