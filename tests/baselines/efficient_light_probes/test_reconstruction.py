@@ -15,6 +15,7 @@ from gibench.baselines.stages import Stages
 from gibench.baselines.training import artifacts, checkpoints
 from gibench.datasets.loading import Frame
 from gibench.rendering.camera import PinholeCamera
+from gibench.rendering.lighting import Shot
 from gibench.rendering.render import render_frame
 from gibench.rendering.scene import load_dict
 from tests.baselines.efficient_light_probes.test_implementation import mirror_floor
@@ -75,12 +76,11 @@ def made(method, where, **given):
 
 def path(count=3):
     """A walk that none of the stills lies on."""
-    cameras = [
-        PinholeCamera((0.5 - 0.05 * k, 0.55, 0.25), (-0.4 - 0.05 * k, -0.5, -0.7), 1.2) for k in range(count)
+    shots = [
+        Shot(PinholeCamera((0.5 - 0.05 * k, 0.55, 0.25), (-0.4 - 0.05 * k, -0.5, -0.7), 1.2))
+        for k in range(count)
     ]
-    return [
-        View(c, b, RESOLUTION, k, 0) for k, (c, b) in enumerate(zip(cameras, [None, *cameras], strict=False))
-    ]
+    return [View(s, b, RESOLUTION, k, 0) for k, (s, b) in enumerate(zip(shots, [None, *shots], strict=False))]
 
 
 @pytest.fixture(scope="module")
