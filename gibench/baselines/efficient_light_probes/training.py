@@ -30,6 +30,7 @@ from gibench.baselines.training.curves import Trained
 from gibench.baselines.training.errors import CheckpointError
 from gibench.baselines.training.learner import Learner, Step
 from gibench.baselines.training.loop import train
+from gibench.baselines.training.losses.pixels import absolute
 from gibench.baselines.training.reproducible import seeded
 from gibench.baselines.training.schedule import half_cosine, set_rate
 from gibench.metrics.lpips_network import build_network
@@ -215,7 +216,7 @@ class Reconstructing(Learner):
         one = self.held_out
         color, guides, truth = (part[None].to(self.device) for part in (one.color, one.guides, one.truth))
         output = self.network(self.scale.compressed(color), self.scale.guides(guides))
-        return losses.absolute(output.clamp(min=0), self.scale.compressed(truth))
+        return absolute(output.clamp(min=0), self.scale.compressed(truth))
 
     def step(self, batch: Crops, now: Step) -> dict[str, Tensor]:
         """Down equation 9, on the crops of a step."""
@@ -240,7 +241,7 @@ class Reconstructing(Learner):
             buffers = torch.cat([buffers, scale.guides(guides_before)])
         outputs = self.network(image, buffers).split(count)
         output = outputs[0]
-        loss = losses.ABSOLUTE * losses.absolute(output, scale.compressed(truth))
+        loss = losses.ABSOLUTE * absolute(output, scale.compressed(truth))
         if self.plan.temporal:
             loss = loss + losses.TEMPORAL * losses.temporal(output, outputs[1], motion, valid)
         if self.judge is not None and batch.seen is not None:

@@ -1,0 +1,1 @@
+"""Numbers as networks take them: positions and directions in more dimensions than they have."""

@@ -1,0 +1,1 @@
+"""What networks are trained for: pixels, features of other networks, and judges that learn along."""
