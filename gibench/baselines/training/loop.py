@@ -172,7 +172,7 @@ class _Run:
         return None
 
     def _look_is_due(self) -> bool:
-        every = self.budget.look_every or (max(1, self.planned // LOOKS) if self.planned else None)
+        every = self.budget.look_every or (math.ceil(self.planned / LOOKS) if self.planned else None)
         return every is not None and self.step % every == 0
 
     def _look(self) -> None:

@@ -46,15 +46,36 @@ def dies_at(learner, number):
     return learner
 
 
-def slow(learner, seconds, look=0.0):
+class Clock:
+    """Of the loop, in the place of that of the machine: it stands still but for what a learner takes."""
+
+    def __init__(self):
+        self.now = 0.0
+
+    def perf_counter(self):
+        return self.now
+
+    def sleep(self, seconds):
+        self.now += seconds
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    made = Clock()
+    monkeypatch.setattr(loop, "time", made)
+    return made
+
+
+def slow(learner, seconds, look=0.0, clock=time):
+    """The learner, with steps and looks that take that long."""
     step, error = learner.step, learner.error
 
     def slower(batch, now):
-        time.sleep(seconds)
+        clock.sleep(seconds)
         return step(batch, now)
 
     def looks():
-        time.sleep(look)
+        clock.sleep(look)
         return error()
 
     learner.step, learner.error = slower, looks
@@ -170,30 +191,36 @@ def test_a_training_that_is_over_is_given_again_without_a_step(tmp_path):
     assert not checkpoint.path.exists()
 
 
-def test_seconds_end_it_with_the_best_so_far():
-    learner = slow(Fit(), 0.01, look=0.05)
+def test_seconds_end_it_with_the_best_so_far(clock):
+    learner = slow(Fit(), 0.01, 0.05, clock)
     trained = train(learner, points(), Budget(steps=10**6, seconds=1.0, look_every=20), seed=0)
     assert trained.ended == "seconds"
-    assert 0 < trained.steps < 100
-    assert trained.curve[-1].step == trained.steps
+    # 20 steps and a look take .25; of the last quarter, .05 are kept for the look that comes at the end.
+    assert trained.steps == 75
+    assert [look.step for look in trained.curve] == [0, 20, 40, 60, 75]
     assert trained.best.error == min(look.error for look in trained.curve)
-    # A step and what a look takes longer than the one before it is all that may be too much.
-    assert trained.seconds < 1.0 + 0.5
+    assert trained.seconds == pytest.approx(1.0)
 
 
-def test_seconds_that_were_spent_before_count(tmp_path):
+def test_seconds_that_were_spent_before_count(tmp_path, clock):
     checkpoint = Checkpoint(tmp_path / "c", {"method": "toy"}, every=0)
     budget = Budget(steps=10**6, seconds=1.0, look_every=20)
     with pytest.raises(Killed):
-        train(dies_at(slow(Fit(), 0.02), 20), points(), budget, seed=0, checkpoint=checkpoint)
-    started = time.perf_counter()
-    trained = train(slow(Fit(), 0.02), points(), budget, seed=0, checkpoint=checkpoint)
-    assert time.perf_counter() - started < trained.seconds - 0.35
-    assert trained.seconds >= 0.9
-    assert 0.35 < trained.before < trained.seconds
+        train(dies_at(slow(Fit(), 0.02, 0, clock), 20), points(), budget, seed=0, checkpoint=checkpoint)
+    clock.now += 1e6
+    trained = train(slow(Fit(), 0.02, 0, clock), points(), budget, seed=0, checkpoint=checkpoint)
+    assert trained.before == pytest.approx(0.4)
+    assert trained.steps in (50, 51)  # as rounding has it
+    assert trained.seconds == pytest.approx(1.0, abs=0.03)
 
 
-def test_where_only_seconds_are_given_the_steps_are_planned_and_can_be_repeated():
+def test_a_budget_too_small_for_a_step_gives_the_untrained_network(clock):
+    trained = train(slow(Fit(), 5.0, 1.0, clock), points(), Budget(seconds=0.5), seed=0)
+    assert (trained.ended, trained.steps) == ("seconds", 1)
+    assert trained.best.step in (0, 1)
+
+
+def test_where_only_seconds_are_given_the_steps_are_planned_and_can_be_repeated(clock):
     class Notes(Fit):
         def __init__(self):
             super().__init__()
@@ -203,15 +230,31 @@ def test_where_only_seconds_are_given_the_steps_are_planned_and_can_be_repeated(
             self.seen.append(now.progress)
             return super().step(batch, now)
 
-    learner = slow(Notes(), 0.005)
-    trained = train(learner, points(), Budget(seconds=1.5), seed=0)
-    assert trained.ended in ("steps", "seconds")
-    assert trained.planned > 20
-    assert trained.steps <= trained.planned
-    assert learner.seen == sorted(learner.seen)
-    assert learner.seen[-1] > 0.5
+    learner = slow(Notes(), 0.01, 0.01, clock)
+    trained = train(learner, points(), Budget(seconds=3.0), seed=0)
+    # .06 s, 2 %, are over after six steps; 50 looks are paid for first.
+    assert trained.planned == pytest.approx((3.0 - 50 * 0.01) / 0.01, abs=3)
+    assert trained.ended == "steps"
+    assert trained.seconds == pytest.approx(3.0, abs=0.05)
+    assert len(trained.curve) <= 1 + 50
     planned_at = sum(progress == 0 for progress in learner.seen)
+    assert planned_at <= 7
     assert learner.seen[planned_at:] == [n / trained.planned for n in range(planned_at, trained.steps)]
+
+
+def test_planned_steps_that_take_longer_than_they_did_end_with_the_seconds(clock):
+    learner = slow(Fit(), 0.01, 0.0, clock)
+    quick = learner.step
+
+    def slower(batch, now):
+        clock.sleep(0.03 if now.number > 50 else 0)
+        return quick(batch, now)
+
+    learner.step = slower
+    trained = train(learner, points(), Budget(seconds=3.0), seed=0)
+    assert trained.ended == "seconds"
+    assert trained.steps < trained.planned
+    assert trained.seconds == pytest.approx(3.0, abs=0.05)
 
 
 def test_patience_ends_it():
