@@ -18,7 +18,7 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -30,7 +30,7 @@ from gibench import gate
 from gibench.baselines.bakes import remove_abandoned
 from gibench.benchmarks import records
 from gibench.benchmarks.errors import ResultsError
-from gibench.datasets.checked import parsed, plain, shown
+from gibench.datasets.checked import checked, plain, shown
 from gibench.datasets.errors import FolderError
 from gibench.datasets.files import as_json, sync_folder, write_whole
 from gibench.datasets.folder import lock_folder, own_leftovers, refuse_links, unlock_folder
@@ -203,12 +203,21 @@ class RunFolder:
             self.run_file, records.Run, "what it said is lost: run again into a new folder"
         )
 
-    def read_checked(self, path: Path, model: type[BaseModel], remedy: str) -> dict[str, Any]:
-        """Read a JSON file of this folder that must be what `model` says. Raises ResultsError with `remedy`."""
+    def read_checked(
+        self,
+        path: Path,
+        model: type[BaseModel],
+        remedy: str,
+        renewed: Callable[[dict[str, Any]], dict[str, Any]] = lambda content: content,
+    ) -> dict[str, Any]:
+        """Read a JSON file of this folder that must be what `model` says. Raises ResultsError with `remedy`.
+
+        renewed: gives what older versions wrote the form of this one.
+        """
         try:
-            content = gate.read_inside(self.root, path.relative_to(self.root))
-            _refuse_other_format(path, plain(content))
-            return parsed(content, model)
+            content = plain(gate.read_inside(self.root, path.relative_to(self.root)))
+            _refuse_other_format(path, content)
+            return checked(renewed(content), model)
         except gate.GateError as problem:
             raise ResultsError(f"{path} is damaged ({problem}): {remedy}") from None
         except ValueError as problem:

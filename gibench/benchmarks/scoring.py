@@ -183,7 +183,22 @@ def read_scores(folder: RunFolder, name: str) -> dict[str, Any] | None:
     path = folder.score_file(name)
     if not path.exists():
         return None
-    return folder.read_checked(path, Scores, f"remove it and run `gibench bench score {folder.root}`")
+    remedy = f"remove it and run `gibench bench score {folder.root}`"
+    return folder.read_checked(path, Scores, remedy, _by_sequence)
+
+
+def _by_sequence(scores: dict[str, Any]) -> dict[str, Any]:
+    """Scores of before a scene had several sequences: the values of its one path stood without a name."""
+    sequences = scores.get("sequences")
+    if not isinstance(sequences, dict):
+        return scores
+    named = {
+        part: {"path": values}
+        if isinstance(values, dict) and not any(isinstance(value, dict) for value in values.values())
+        else values
+        for part, values in sequences.items()
+    }
+    return {**scores, "sequences": named}
 
 
 def _scored(unit: _Unit) -> tuple[dict[str, str], str]:
@@ -233,7 +248,7 @@ def _finite(value: Any) -> Any:
 def exposures_of(folder: RunFolder, scene: SceneFiles) -> tuple[float, ...]:
     """The exposure that each frame is seen under: `reference_exposure`, shared by the frames of a sequence."""
     known = read_scores(folder, scene.name)
-    if known is not None:
+    if known is not None and len(known.get("exposures", ())) == len(scene):  # older scores have one, or none
         return tuple(float(exposure) for exposure in known["exposures"])
     exposures = [0.0] * len(scene)
     stills = [range(frame, frame + 1) for frame in range(len(scene)) if scene.stretch(frame) is None]

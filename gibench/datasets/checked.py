@@ -56,7 +56,11 @@ def parsed(content: bytes, model: type[BaseModel]) -> dict[str, Any]:
 
     Raises ValueError with one line that says what is wrong, and where in the file.
     """
-    value = plain(content)
+    return checked(plain(content), model)
+
+
+def checked(value: dict[str, Any], model: type[BaseModel]) -> dict[str, Any]:
+    """The same for what is read already."""
     try:
         model.model_validate(value)
     except ValidationError as problems:

@@ -202,3 +202,28 @@ def test_scenes_of_a_run_name_files_of_their_own_folder_alone(run, inner):
         return
     with pytest.raises(ResultsError, match=rf"scene\.xml is not read: .*({SCENES[inner]})"):
         refuse_files_outside(root, scene)
+
+
+def test_scores_of_before_scenes_had_several_sequences_are_read(run):
+    score(run)
+    names = [good(run), "room-000000"]
+    before, exposure = load(run.root), load(run.root).exposure("room-000000", 0)
+    for name in names:
+        scores = json.loads(run.score_file(name).read_text())
+        scores["exposure"] = scores.pop("exposures")[0]
+        for part, sequences in scores["sequences"].items():
+            (scores["sequences"][part],) = sequences.values()
+        run.score_file(name).write_bytes(as_json(scores))
+    after = load(run.root)
+    assert after.floor.equals(before.floor)
+    assert after.sequences.drop(columns="sequence").equals(before.sequences.drop(columns="sequence"))
+    assert after.exposure("room-000000", 0) == exposure
+
+
+@pytest.mark.parametrize("exposures", [[], [1.0], [1.0] * 99])
+def test_exposures_of_other_frames_are_computed_anew(run, exposures):
+    score(run)
+    right = [load(run.root).exposure("room-000000", frame) for frame in range(3)]
+    path = run.score_file("room-000000")
+    path.write_bytes(as_json({**json.loads(path.read_text()), "exposures": exposures}))
+    assert [load(run.root).exposure("room-000000", frame) for frame in range(3)] == right
