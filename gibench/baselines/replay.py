@@ -44,7 +44,8 @@ class Replay:
 
         held: arrays, or pytrees of them, that it reads besides and that stay as they are.
         """
-        self._held = [scene.mi_scene, scene._tables, scene.layers.arrays, _kinds(), held]
+        guide = [] if scene.guide is None else scene.guide.arrays
+        self._held = [scene.mi_scene, scene._tables, scene.layers.arrays, guide, _kinds(), held]
         # Their arrays are others after a change of the light.
         self._changing = [thing for thing in (scene.portals, scene.lights) if thing is not None]
         self._function = function

@@ -95,6 +95,10 @@ class Recipe(BaseModel):
         description="an integer from 0 to 2³²−1 (another one gives the same rooms with independent noise)",
     )
     max_depth: int = Field(8, ge=1, le=1000, description="an integer from 1 to 1000 (scattering events)")
+    sampling: Literal["plain", "guided"] = Field(
+        "plain",
+        description='"plain" or "guided" (paths choose lights and directions by what is learned of a room first)',
+    )
     denoise: bool = Field(True, description="true or false")
     channels: Names = Field(
         ("radiance", "surface"), validate_default=True, description="a list of channels or sets of channels"
@@ -334,7 +338,7 @@ class Recipe(BaseModel):
             del values["path_rooms"]
         if not self.sample_seed:
             del values["sample_seed"]
-        for key in ("path_moves", "sequences", "lighting", "environments", "opened", "gloss"):
+        for key in ("path_moves", "sequences", "lighting", "environments", "opened", "gloss", "sampling"):
             if not values[key] or values[key] == type(self).model_fields[key].default:
                 del values[key]
         if self.environments:

@@ -156,6 +156,7 @@ def _launch(scene: Scene, generator: RayGenerator, block: _Block) -> _Launched:
         guides=block.guides,
         portals=scene.portals,
         layers=scene.layers,
+        guide=scene.guide,
     )
 
     parts = {name: getattr(path, name) for name in PARTS}
@@ -301,6 +302,7 @@ def estimate_radiance(
     if max_depth < 0:
         raise EstimateError(f"max_depth is {max_depth}: it counts scattering events, from 0")
 
+    _ = scene.guide  # learned before the clock of the kernels runs
     width, height = resolution
     estimate = Estimate(width * height, group_levels(spp if spp is not None else ROUND))
     goal = spp if spp is not None else spp_cap - spp_cap % ROUND

@@ -110,7 +110,7 @@ def surroundings(
     return back <= MOST_BACK_FACES * np.maximum(hit.sum(axis=1), 1), distance.min(axis=1)
 
 
-def _beginnings(scene: Scene) -> NDArray[np.float64]:
+def beginnings(scene: Scene) -> NDArray[np.float64]:
     """(N, 3) the middle of every shape's bounding box and points next to its six sides."""
     points = []
     for shape in scene.mi_scene.shapes():
@@ -139,7 +139,7 @@ def free_space(scene: Scene) -> NDArray[np.float64]:
 
     Raises NoFreeSpace where no point of the scene is enclosed.
     """
-    points = _beginnings(scene)
+    points = beginnings(scene)
     points = points[enclosed(scene, points)] if len(points) else points
     points = points[surroundings(scene, points)[0]] if len(points) else points
     if not len(points):

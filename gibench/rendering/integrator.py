@@ -19,13 +19,11 @@ import drjit as dr
 import mitsuba as mi
 
 from gibench.rendering.backend import is_scalar
+from gibench.rendering.light_sampling import emission, emission_weight, inverse, mis_weight, sample_light
 
 RR_DEPTH = 2
 """Scattering events after which Russian roulette may end a path. Variance times time over three furnished rooms is 7 to
 17 % below that of 5, the value of Mitsuba's `path`."""
-
-SMALLEST = 1.2e-38
-"""The smallest normal float32."""
 
 RR_CAP = 0.95
 """Largest survival probability, so that a path in a white furnace ends too."""
@@ -45,19 +43,6 @@ class PathSample:
     indirect_specular: Any
     albedo: Any = None
     normal: Any = None
-
-
-def _inverse(x):
-    """1/x for x ≥ 0, where 0 gives something huge yet finite."""
-    return dr.rcp(dr.maximum(x, SMALLEST))
-
-
-def mis_weight(pdf_a, pdf_b):
-    """Power heuristic for a sample drawn with `pdf_a`; 0 where it could not be drawn.
-
-    As a ratio, since the squares of densities near a mirror's overflow.
-    """
-    return dr.select(pdf_a > 0, dr.rcp(1 + dr.square(pdf_b * _inverse(pdf_a))), 0)
 
 
 _DIFFUSE = mi.BSDFFlags.DiffuseReflection
@@ -104,7 +89,7 @@ def _principled_diffuse(bsdf, si, wo, active):
     lobe = (1 - 0.5 * grazing_i) * (1 - 0.5 * grazing_o)
     lobe += retro * (grazing_o + grazing_i + grazing_o * grazing_i * (retro - 1))
     inner = dr.lerp(1, 0.5 * retro, grazing_o) * dr.lerp(1, 0.5 * retro, grazing_i)
-    flat = 1.25 * (inner * (_inverse(cos_i + cos_o) - 0.5) + 0.5)
+    flat = 1.25 * (inner * (inverse(cos_i + cos_o) - 0.5) + 0.5)
     base = bsdf.eval_attribute("base_color", si, active)
     value = base * matte * dr.lerp(lobe, flat, number("flatness")) * cos_o * dr.inv_pi
     return dr.select(active & (cos_i > 0) & (cos_o > 0), value, 0)
@@ -130,120 +115,138 @@ def _diffuse_lobe(layers, bsdf, context, si, wo, active):
     return dr.clip(value - excess, 0, value)
 
 
-def _emission(scene, si, active):
-    emitter = si.emitter(scene)
-    # None only in the scalar variant, where an array of pointers would hold a null.
-    return mi.Spectrum(0) if emitter is None else emitter.eval(si, active)
-
-
-def _emission_weight(scene, portals, si, reference, pdf, delta, active):
-    """Weight of emission met by sampling the BSDF, against sampling the light from `reference`."""
-    emitter = si.emitter(scene)
-    if emitter is None:
-        return mi.Float(0)
-    towards = mi.DirectionSample3f(scene, si, reference)
-    active = active & (delta ^ True)
-    light_pdf = scene.pdf_emitter_direction(reference, towards, active)
-    if portals is not None:
-        by_portal = dr.select(emitter == portals.environment, portals.density(reference.p, towards.d), 0)
-        light_pdf = dr.lerp(light_pdf, by_portal, portals.share)
-    return mis_weight(pdf, light_pdf)
-
-
-def _sample_light(scene, portals, si, u, active):
-    """Samples a direction to a light that si sees.
-
-    Returns the direction, its density per steradian (0 where there is no light), whether nothing but this could have
-    found it, and radiance over density.
-    """
-    if portals is None:
-        sample, light = scene.sample_emitter_direction(si, u, True, active)
-        return sample.d, sample.pdf, sample.delta, light
-    share = portals.share
-    entering = active & (u.x < share)
-    u = mi.Point2f(dr.select(entering, u.x / share, (u.x - share) / (1 - share)), u.y)
-    sample, light = scene.sample_emitter_direction(si, u, False, active & (entering ^ True))
-    through = portals.sample(si.p, u)
-    entering &= dr.any(through != 0)
-    radiance = light * sample.pdf
-    direction = dr.select(entering, through, sample.d)
-    ray = si.spawn_ray_to(sample.p)
-    ray = dr.select(entering, si.spawn_ray(direction), ray)
-
-    # One density for both ways to the environment.
-    outside = dr.zeros(mi.DirectionSample3f)
-    outside.d = direction
-    outside.emitter = portals.environment
-    pdf = dr.select(entering, scene.pdf_emitter_direction(si, outside, entering), sample.pdf)
-    sky = dr.zeros(mi.SurfaceInteraction3f)
-    sky.wi = -direction
-    radiance = dr.select(entering, portals.environment.eval(sky, entering), radiance)
-    to_environment = entering | (sample.emitter == portals.environment)
-    by_portal = dr.select(to_environment, portals.density(si.p, direction), 0)
-    delta = sample.delta & (entering ^ True)
-    mixed = dr.lerp(pdf, by_portal, share)
-    chosen = active & (mixed > 0) & (entering | (sample.pdf > 0))
-    chosen &= scene.ray_test(ray, chosen) ^ True
-    return direction, dr.select(chosen, mixed, 0), delta, dr.select(chosen, radiance * _inverse(mixed), 0)
+def _as_expected(weight):
+    """A BSDF sample's weight, or 1 where it has failed: another direction may be taken in its place."""
+    return dr.select(dr.max(weight) > 0, weight, 1)
 
 
 @dr.syntax
-def _indirect(scene, portals, sampler, ray, reference, pdf, delta, weight, eta, active, max_depth):
-    """Follows a path from its first bounce on.
+def _follow(
+    scene,
+    portals,
+    guide,
+    recorder,
+    sampler,
+    ray,
+    reference,
+    row,
+    pdf,
+    delta,
+    expected,
+    eta,
+    depth,
+    active,
+    max_depth,
+):
+    """Follows paths along `ray` to their end. All of it is per unit of throughput at its start.
 
-    reference: the first hit (mi.Interaction3f); pdf, delta: of the direction taken there; weight: throughput of the
-    first bounce over both lobes, for Russian roulette. Returns emission met right after the first bounce (direct
-    light) and everything later, both per unit of first-bounce throughput.
+    reference: where the ray starts (mi.Interaction3f); row: of the guide there; pdf, delta: of the direction taken;
+    expected: throughput so far as the BSDFs alone would sample it, for Russian roulette; eta: relative index of
+    refraction so far; depth: scattering events so far. Returns emission met at the end of the ray, and everything
+    later.
     """
     context = mi.BSDFContext()
     ray = mi.Ray3f(ray)
     reference = mi.Interaction3f(reference)
-    pdf, delta = mi.Float(pdf), mi.Bool(delta)
-    weight, eta, active = mi.Spectrum(weight), mi.Float(eta), mi.Bool(active)
-    direct, later = mi.Spectrum(0), mi.Spectrum(0)
+    row, pdf, delta = mi.UInt32(row), mi.Float(pdf), mi.Bool(delta)
+    expected, eta, active = mi.Spectrum(expected), mi.Float(eta), mi.Bool(active)
+    met, later = mi.Spectrum(0), mi.Spectrum(0)
     throughput = mi.Spectrum(1)
-    depth = mi.UInt32(1)
+    depth = mi.UInt32(depth)
+    first = mi.Bool(True)
 
     while active:
         si = scene.ray_intersect(ray, mi.RayFlags.All, False, active)
 
         # Emission at this vertex, weighted against the light sampling of the vertex before it.
-        share = _emission_weight(scene, portals, si, reference, pdf, delta, active)
-        seen = throughput * _emission(scene, si, active) * share
-        direct += dr.select(depth == 1, seen, 0)
-        later += dr.select(depth == 1, 0, seen)
+        weight = emission_weight(scene, portals, guide, si, reference, row, pdf, delta, active)
+        emitted = throughput * emission(scene, si, active) * weight
+        met += dr.select(first, emitted, 0)
+        later += dr.select(first, 0, emitted)
+        first = mi.Bool(False)
 
         active &= si.is_valid() & (depth < max_depth)
         bsdf = bsdf_at(si, ray)
 
         # Light sampling.
         lit = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-        direction, light_pdf, only_so, light = _sample_light(scene, portals, si, sampler.next_2d(), lit)
-        lit &= light_pdf != 0
-        to_light = si.to_local(direction)
-        value, value_pdf, bounce, bounce_weight = bsdf.eval_pdf_sample(
+        if dr.hint(guide is not None, mode="scalar"):
+            row = guide.row(si, sampler, active)
+        light = sample_light(scene, portals, guide, si, row, sampler, lit)
+        lit &= light.pdf != 0
+        to_light = si.to_local(light.direction)
+        value, light_bounce_pdf, bounce, bounce_weight = bsdf.eval_pdf_sample(
             context, si, to_light, sampler.next_1d(), sampler.next_2d(), active
         )
+        if dr.hint(guide is not None, mode="scalar"):
+            share = guide.share(row, bsdf, active)
+            light_bounce_pdf = guide.mixed_density(row, share, light.direction, light_bounce_pdf, lit)
         value = si.to_world_mueller(value, -to_light, si.wi)
-        share = dr.select(only_so, 1, mis_weight(light_pdf, value_pdf))
-        later += dr.select(lit, throughput * value * light * share, 0)
+        weight = dr.select(light.delta, 1, mis_weight(light.pdf, light_bounce_pdf))
+        reflected = dr.select(lit, value * light.weight * weight, 0)
+        later += throughput * reflected
 
         # The next direction.
-        ray = si.spawn_ray(si.to_world(bounce.wo))
-        throughput *= si.to_world_mueller(bounce_weight, -bounce.wo, si.wi)
-        eta *= bounce.eta
-        reference = mi.Interaction3f(si)
+        bounce_weight = si.to_world_mueller(bounce_weight, -bounce.wo, si.wi)
+        expected *= _as_expected(bounce_weight)
         pdf = bounce.pdf
         delta = mi.has_flag(bounce.sampled_type, mi.BSDFFlags.Delta)
+        direction = si.to_world(bounce.wo)
+        bounce_eta = bounce.eta
+        if dr.hint(guide is not None, mode="scalar"):
+            direction, bounce_weight, pdf, delta, bounce_eta = guide.bounce(
+                context, si, bsdf, row, share, bounce, bounce_weight, sampler, active
+            )
         depth += 1
+        if dr.hint(recorder is not None, mode="scalar"):
+            recorder.vertex(
+                row,
+                si,
+                bsdf,
+                direction,
+                pdf,
+                delta,
+                throughput,
+                met + later,
+                light.light,
+                reflected,
+                depth,
+                active,
+            )
+        ray = si.spawn_ray(direction)
+        throughput *= bounce_weight
+        eta *= bounce_eta
+        reference = mi.Interaction3f(si)
 
-        survival = dr.minimum(dr.max(throughput * weight) * dr.square(eta), RR_CAP)
+        # The roulette looks at what a path is expected to carry: a guided path to where much light comes from carries
+        # little for each, and must not be ended for it.
+        survival = dr.minimum(dr.max(expected) * dr.square(eta), RR_CAP)
         roulette = depth >= RR_DEPTH
-        active &= survival > 0
+        active &= (survival > 0) & (dr.max(throughput) > 0)
         active &= (roulette ^ True) | (sampler.next_1d() < survival)
-        throughput *= dr.select(roulette, _inverse(survival), 1)
+        spared = dr.select(roulette, inverse(survival), 1)
+        throughput *= spared
+        expected *= spared
 
-    return direct, later
+    return met, later
+
+
+def follow_paths(scene, sampler, ray, *, max_depth: int, portals=None, guide=None, recorder=None):
+    """Light along rays, one path each: emission at the first hit, and all that it reflects (two mi.Color3f).
+
+    sampler: independent. recorder: told of every vertex that scatters, see `guiding.learning`.
+    """
+    nowhere = dr.zeros(mi.Interaction3f)
+    start = {
+        "reference": nowhere,
+        "row": 0,
+        "pdf": 1.0,
+        "delta": True,
+        "expected": 1.0,
+        "eta": 1.0,
+        "depth": 0,
+    }
+    return _follow(scene, portals, guide, recorder, sampler, ray, **start, active=True, max_depth=max_depth)
 
 
 def scatter_paths(
@@ -257,13 +260,15 @@ def scatter_paths(
     lobes: str = "all",
     portals: Any = None,
     layers: Any = None,
+    guide: Any = None,
 ) -> PathSample:
     """Traces one path a lane from points that light is reflected at, and sorts what they send along si.wi.
 
     scene: mitsuba.Scene. sampler: from `sampling`. si: mi.SurfaceInteraction3f, bsdf: its material. max_depth: largest
     number of scattering events, that at si included. lobes: "all"; "diffuse" or "specular" reflect by that lobe
     alone, with all samples, and leave the other at 0. portals: `Scene.portals`, for less noise by daylight. layers:
-    `Scene.layers`, without which all of `principled` counts as diffuse. emission of the result is 0.
+    `Scene.layers`, without which all of `principled` counts as diffuse. guide: `Scene.guide`, for less noise. emission
+    of the result is 0.
     """
     by_hand = layers is not None and layers.principled
     mask = {"all": int(mi.BSDFFlags.All), "diffuse": int(_DIFFUSE), "specular": NOT_DIFFUSE}[lobes]
@@ -274,24 +279,32 @@ def scatter_paths(
 
     # The same calls as in the loop, and one more for the diffuse lobe alone: kernels stay small.
     lit = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-    direction, light_pdf, only_so, light = _sample_light(scene, portals, si, sampler.next_2d(), lit)
-    lit &= light_pdf != 0
-    to_light = si.to_local(direction)
-    value, value_pdf, bounce, weight = bsdf.eval_pdf_sample(
+    row = mi.UInt32(0) if guide is None else guide.row(si, sampler.independent, active)
+    light = sample_light(scene, portals, guide, si, row, sampler, lit)
+    lit &= light.pdf != 0
+    to_light = si.to_local(light.direction)
+    value, light_bounce_pdf, bounce, weight = bsdf.eval_pdf_sample(
         asked, si, to_light, sampler.next_1d(), sampler.next_2d(), active
     )
-    share = dr.select(only_so, 1, mis_weight(light_pdf, value_pdf))
-    light = dr.select(lit, light * share, 0)
-
+    direction, pdf, eta, expected = si.to_world(bounce.wo), bounce.pdf, bounce.eta, _as_expected(weight)
     delta = mi.has_flag(bounce.sampled_type, mi.BSDFFlags.Delta)
+    if guide is not None:
+        share = guide.share(row, bsdf, active)
+        light_bounce_pdf = guide.mixed_density(row, share, light.direction, light_bounce_pdf, lit)
+        direction, weight, pdf, delta, eta = guide.bounce(
+            asked, si, bsdf, row, share, bounce, weight, sampler, active
+        )
+    mis = dr.select(light.delta, 1, mis_weight(light.pdf, light_bounce_pdf))
+    incident = dr.select(lit, light.weight * mis, 0)
+
     none = mi.Spectrum(0)
     if lobes == "all" or by_hand:
         value_diffuse, value_other = _split(
             bsdf, value, _diffuse_lobe(layers, bsdf, diffuse, si, to_light, lit)
         )
-        smooth = active & (delta ^ True) & (bounce.pdf > 0)
-        bounce_diffuse = _diffuse_lobe(layers, bsdf, diffuse, si, bounce.wo, smooth)
-        bounce_diffuse *= dr.select(smooth, _inverse(bounce.pdf), 0)
+        smooth = active & (delta ^ True) & (pdf > 0)
+        bounce_diffuse = _diffuse_lobe(layers, bsdf, diffuse, si, si.to_local(direction), smooth)
+        bounce_diffuse *= dr.select(smooth, inverse(pdf), 0)
         weight_diffuse, weight_other = _split(bsdf, weight, bounce_diffuse)
         if lobes == "diffuse":
             value_other, weight_other = none, none
@@ -303,25 +316,29 @@ def scatter_paths(
         value_diffuse, value_other, weight_diffuse, weight_other = none, value, none, weight
     active &= dr.max(weight) > 0
 
-    seen, later = _indirect(
+    direct, indirect = _follow(
         scene,
         portals,
+        guide,
+        None,
         sampler.independent,
-        si.spawn_ray(si.to_world(bounce.wo)),
+        si.spawn_ray(direction),
         mi.Interaction3f(si),
-        bounce.pdf,
+        row,
+        pdf,
         delta,
-        weight,
-        bounce.eta,
+        expected,
+        eta,
+        1,
         active,
         max_depth,
     )
     return PathSample(
         mi.Spectrum(0),
-        light * value_diffuse + weight_diffuse * seen,
-        light * value_other + weight_other * seen,
-        weight_diffuse * later,
-        weight_other * later,
+        incident * value_diffuse + weight_diffuse * direct,
+        incident * value_other + weight_other * direct,
+        weight_diffuse * indirect,
+        weight_other * indirect,
     )
 
 
@@ -334,19 +351,28 @@ def trace_paths(
     guides: bool = False,
     portals: Any = None,
     layers: Any = None,
+    guide: Any = None,
 ) -> PathSample:
     """Traces one path a lane and sorts its radiance.
 
     scene: mitsuba.Scene. sampler: from `sampling`. ray: mi.Ray3f. max_depth: largest number of scattering events, ≥ 0
     (Mitsuba's `path` counts segments: its max_depth is one more). guides: whether first-hit albedo and normal are
-    returned too. portals, layers: those of the `Scene`, as for `scatter_paths`.
+    returned too. portals, layers, guide: those of the `Scene`, as for `scatter_paths`.
     """
     si = scene.ray_intersect(ray, mi.RayFlags.All, True)
     bsdf = bsdf_at(si, ray)
     result = scatter_paths(
-        scene, sampler, si, bsdf, mi.Bool(True), max_depth=max_depth, portals=portals, layers=layers
+        scene,
+        sampler,
+        si,
+        bsdf,
+        mi.Bool(True),
+        max_depth=max_depth,
+        portals=portals,
+        layers=layers,
+        guide=guide,
     )
-    result.emission = _emission(scene, si, True)
+    result.emission = emission(scene, si, True)
     if guides:
         # On a conductor this is a value of its lobe and may exceed 1; the denoiser wants [0, 1].
         result.albedo = dr.select(si.is_valid(), dr.clip(bsdf.eval_diffuse_reflectance(si), 0, 1), 0)

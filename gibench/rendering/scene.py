@@ -20,6 +20,13 @@ OPENINGS = "openings.json"
 """Beside scene.xml: a list of rectangles, each as corner and two edges in metres, that daylight enters by."""
 
 
+PLAIN, GUIDED = "plain", "guided"
+
+SAMPLINGS = (PLAIN, GUIDED)
+"""How paths choose lights and directions: by the materials alone, or also by what is learned of the room first. The
+means are the same; a guide costs some seconds a scene and then about halves the samples that a frame needs."""
+
+
 class SceneError(GibenchError):
     """A scene file that is not there or that Mitsuba refuses, or a scene with a shape that cannot be rendered."""
 
@@ -32,7 +39,7 @@ class Scene:
     is alphabetical by shape id (a material stands where its first shape does): Mitsuba loads in parallel and lists
     shapes in an order of its own. openings: (N, 3, 3), the rectangles that daylight enters by (corner and two edges
     whose cross product points inside, metres), or None where nothing is known of them. lights: `light_rig.Lights`, what
-    lights it now, or None for a scene that keeps its own light.
+    lights it now, or None for a scene that keeps its own light. sampling: one of SAMPLINGS.
     """
 
     mi_scene: Any
@@ -42,6 +49,7 @@ class Scene:
     _shape_of: dict[int, int]
     openings: NDArray[np.float64] | None = None
     lights: Any = None
+    sampling: str = PLAIN
     _beside: tuple[Any, ...] = ()  # what must live as long as the scene
 
     @cached_property
@@ -66,6 +74,19 @@ class Scene:
         from gibench.rendering.portals import Portals
 
         return Portals(self.mi_scene, self.openings)
+
+    @cached_property
+    def guide(self) -> Any:
+        """`guiding.guide.Guide` of the scene as it is lit when first asked for.
+
+        None where the sampling is plain, where the light moves, where there is nothing to learn, or under the scalar
+        variant.
+        """
+        if self.sampling == PLAIN or self.lights is not None:
+            return None
+        from gibench.rendering.guiding.learning import learn
+
+        return learn(self)
 
     @cached_property
     def layers(self) -> Any:
@@ -147,17 +168,21 @@ def load_dict(description: dict[str, Any]) -> Scene:
     return wrap(mi.load_dict(description, optimize=False))
 
 
-def load_scene(path: str | Path, *, share_kernels: bool = False) -> Scene:
+def load_scene(path: str | Path, *, share_kernels: bool = False, sampling: str = PLAIN) -> Scene:
     """A scene from a Mitsuba 3 XML file. Selects a variant where none is current.
 
     share_kernels: for one of many rooms, so that the next need not be compiled again; see `kernel_sharing`. A file
-    OPENINGS beside it says where daylight enters; without it the same image takes more samples.
+    OPENINGS beside it says where daylight enters; without it the same image takes more samples. sampling: one of
+    SAMPLINGS.
 
-    Raises SceneError where the file is missing or Mitsuba refuses it, with its reason, and as `wrap` does.
+    Raises SceneError for another sampling, where the file is missing or Mitsuba refuses it, with its reason, and as
+    `wrap` does.
     """
     select_variant()
     import mitsuba as mi
 
+    if sampling not in SAMPLINGS:
+        raise SceneError(f"there is no sampling {sampling!r}: use {' or '.join(SAMPLINGS)}")
     if not Path(path).is_file():
         raise SceneError(f"there is no scene file {path}")
     try:
@@ -168,7 +193,9 @@ def load_scene(path: str | Path, *, share_kernels: bool = False) -> Scene:
         reason = " ".join(str(error).split())
         raise SceneError(f"Mitsuba refuses {path}: {reason}") from error
     openings = _openings(Path(path).with_name(OPENINGS))
-    return replace(scene, openings=openings, _beside=spare_plugins() if share_kernels else ())
+    return replace(
+        scene, openings=openings, sampling=sampling, _beside=spare_plugins() if share_kernels else ()
+    )
 
 
 def _openings(file: Path) -> NDArray[np.float64] | None:

@@ -146,6 +146,7 @@ def _launch(points, begin, number, start, size, samples, max_depth, seed):
         lobes="diffuse",
         portals=points.scene.portals,
         layers=points.scene.layers,
+        guide=points.scene.guide,
     )
     light = path.direct_diffuse + path.indirect_diffuse
     tells = [dr.isfinite(value) & (over > BLACK) for value, over in zip(light, lobe, strict=True)]

@@ -193,6 +193,7 @@ class _Baker:
             lobes=lobes,
             portals=self.scene.portals,
             layers=(self.scene if narrowed is None else narrowed).layers,
+            guide=self.scene.guide,
         )
         value = path.direct_specular + path.indirect_specular
         if lobes == "all":

@@ -1,0 +1,189 @@
+"""A learned guide on the device: the lights and the directions that paths choose at a place."""
+
+# mypy: disable-error-code="no-untyped-def, misc"
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from gibench.rendering.backend import registry_key
+from gibench.rendering.guiding.alias import alias_tables, pick
+from gibench.rendering.guiding.directions import BINS, bin_of, direction_in
+from gibench.rendering.guiding.grid import Grid
+from gibench.rendering.light_sampling import inverse
+
+
+@dataclass(frozen=True)
+class Distributions:
+    """What is learned. Row 0 stands for all places of which nothing is known.
+
+    rows: (places,) uint32, the row of each place of the grid. lights: (E, L) over the lights, and the portals as one
+    more. directions: (E, BINS), relative. share: (E,) of directions that the guide chooses, in [0, 1); the BSDF chooses
+    the others.
+    """
+
+    rows: NDArray[np.uint32]
+    lights: NDArray[np.float64]
+    directions: NDArray[np.float64]
+    share: NDArray[np.float64]
+
+
+def lights_of(mi_scene: Any) -> list[Any]:
+    """The emitters of a scene, in an order that does not depend on how it was loaded."""
+    shapes = sorted((s for s in mi_scene.shapes() if s.is_emitter()), key=lambda s: s.id())
+    on_shapes = [shape.emitter() for shape in shapes]
+    known = {registry_key("EmitterPtr", emitter) for emitter in on_shapes}
+    others = [e for e in mi_scene.emitters() if registry_key("EmitterPtr", e) not in known]
+    return [*on_shapes, *sorted(others, key=lambda e: e.id())]
+
+
+class Guide:
+    """Chooses lights and directions for paths.
+
+    All that it returns comes with its exact density, and no light and no direction that reflects light is left out, so
+    that estimates are unbiased whatever was learned. arrays: those of the device, for kernels that are recorded.
+    """
+
+    def __init__(self, mi_scene: Any, portals: Any, grid: Grid, learned: Distributions) -> None:
+        """portals: `Portals` that light comes in by, or None. Under a vectorised variant, with at least one light."""
+        self.grid, self.portals = grid, portals
+        emitters = lights_of(mi_scene)
+        keys = [registry_key("EmitterPtr", emitter) for emitter in emitters]
+        numbers = np.zeros(max(keys) + 1, dtype=np.uint32)
+        numbers[keys] = np.arange(len(keys))
+        light_table, light_probability = alias_tables(learned.lights)
+        table, probability = alias_tables(learned.directions)
+        self._emitters = dr.reinterpret_array(mi.EmitterPtr, mi.UInt32(np.array(keys, dtype=np.uint32)))
+        self._numbers = mi.UInt32(numbers)
+        self._lights = mi.UInt32(learned.lights.shape[1])
+        self._portal_light = mi.UInt32(len(keys))
+        self._rows = mi.UInt32(learned.rows)
+        self._share = mi.Float(learned.share)
+        self._light_table = mi.UInt32(light_table.ravel())
+        self._light_probability = mi.Float(light_probability.ravel())
+        self._table = mi.UInt32(table.ravel())
+        self._density = mi.Float(probability.ravel() * (BINS / (4 * np.pi)))
+        self.arrays = [value for value in vars(self).values() if dr.is_array_v(value)] + grid.arrays
+        dr.make_opaque(self.arrays)
+
+    def row(self, si, sampler, active):
+        """Row of the distributions for the side of a surface that si.wi sees. sampler: independent."""
+        normal = dr.mulsign(si.n, dr.dot(si.n, si.to_world(si.wi)))
+        shift = mi.Vector3f(sampler.next_1d(), sampler.next_1d(), sampler.next_1d()) - 0.5
+        place, inside = self.grid.place(si.p, normal, shift)
+        return dr.gather(mi.UInt32, self._rows, place, active & inside)
+
+    def share(self, row, bsdf, active):
+        """Probability that a bounce is the guide's: 0 for what is not diffuse, which knows better itself."""
+        diffuse = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.DiffuseReflection)
+        return dr.gather(mi.Float, self._share, row, diffuse)
+
+    def density(self, row, direction, active):
+        """Of the guide's directions, per steradian."""
+        return dr.gather(mi.Float, self._density, row * BINS + bin_of(direction), active)
+
+    def mixed_density(self, row, share, direction, bsdf_pdf, active):
+        """Density of the direction of a bounce, chosen by the BSDF or by the guide."""
+        return dr.lerp(bsdf_pdf, self.density(row, direction, active), share)
+
+    def bounce(self, context, si, bsdf, row, share, sampled, weight, sampler, active):
+        """The next direction: the BSDF's sample, or the guide's in its place (one-sample MIS, Veach 1997, 9.2.4).
+
+        sampled, weight: of the BSDF. Returns the direction (world), the weight (BSDF value over density), the density,
+        whether it is a delta lobe's, and the relative index of refraction.
+        """
+        guided = active & (sampler.next_1d() < share)
+        item = pick(self._table, row, mi.UInt32(BINS), sampler.next_1d(), guided)
+        direction = direction_in(item, sampler.next_2d())
+        local = si.to_local(direction)
+        value, pdf = bsdf.eval_pdf(context, si, local, guided)
+        delta = mi.has_flag(sampled.sampled_type, mi.BSDFFlags.Delta) & (guided ^ True)
+        direction = dr.select(guided, direction, si.to_world(sampled.wo))
+        value = dr.select(guided, value, weight * sampled.pdf)
+        pdf = dr.select(guided, pdf, sampled.pdf)
+        mixed = dr.lerp(pdf, self.density(row, direction, active), share)
+        mixed_weight = dr.select(mixed > 0, value * inverse(mixed), 0)
+        # Where nothing guides, the sample stays what it was: the density of a near-mirror may overflow.
+        alone = (share == 0) | delta
+        return (
+            direction,
+            dr.select(alone, weight / (1 - share), mixed_weight),
+            dr.select(alone, sampled.pdf, mixed),
+            delta,
+            dr.select(guided, 1, sampled.eta),
+        )
+
+    def light_probability(self, row, light, active):
+        """With which a light is chosen. light: its number."""
+        return dr.gather(mi.Float, self._light_probability, row * self._lights + light, active)
+
+    def _number(self, emitter, active):
+        return dr.gather(mi.UInt32, self._numbers, dr.reinterpret_array(mi.UInt32, emitter), active)
+
+    def _through_portals(self, reference, row, direction, active):
+        density = self.portals.density(reference.p, direction)
+        return dr.select(active, density * self.light_probability(row, self._portal_light, active), 0)
+
+    def light_density(self, reference, row, emitter, towards, active):
+        """Density with which `sample_light` finds a point of an emitter, per steradian.
+
+        reference: where from. emitter: pointers. towards: mi.DirectionSample3f to the point.
+        """
+        active = active & (emitter != dr.zeros(mi.EmitterPtr))
+        chosen = self.light_probability(row, self._number(emitter, active), active)
+        density = emitter.pdf_direction(reference, towards, active) * chosen
+        if self.portals is None:
+            return density
+        return density + self._through_portals(
+            reference, row, towards.d, active & (emitter == self.portals.environment)
+        )
+
+    def sample_light(self, scene, si, row, sampler, active):
+        """Samples a light that si sees.
+
+        Returns the direction, its density per steradian (0 where there is none), whether it is a delta light's,
+        radiance over density, and the number of the light.
+        """
+        light = pick(self._light_table, row, self._lights, sampler.next_1d(), active)
+        u = sampler.next_2d()
+        entering = mi.Bool(False) if self.portals is None else active & (light == self._portal_light)
+        emitter = dr.gather(mi.EmitterPtr, self._emitters, light, active & (entering ^ True))
+        sample, weight = emitter.sample_direction(si, u, active & (entering ^ True))
+        direction, delta = sample.d, sample.delta
+        ray = si.spawn_ray_to(sample.p)
+        chosen = self.light_probability(row, light, active)
+        density = sample.pdf * chosen
+        if self.portals is not None:
+            environment = self.portals.environment
+            through = self.portals.sample(si.p, u)
+            entering &= dr.any(through != 0)
+            direction = dr.select(entering, through, direction)
+            ray = dr.select(entering, si.spawn_ray(direction), ray)
+            delta &= entering ^ True
+            sky = dr.zeros(mi.SurfaceInteraction3f)
+            sky.wi = -direction
+            radiance = environment.eval(sky, entering)
+            # One density for both ways to the environment.
+            outside = dr.zeros(mi.DirectionSample3f)
+            outside.d = direction
+            outside.emitter = environment
+            of_environment = self.light_probability(row, self._number(environment, True), entering)
+            density = dr.select(
+                entering, environment.pdf_direction(si, outside, entering) * of_environment, density
+            )
+            by_sky = active & (entering | (emitter == environment))
+            density += self._through_portals(si, row, direction, by_sky)
+            # As a ratio of densities: that of a lamp far away may be close to overflow.
+            weight = dr.select(
+                entering, radiance * inverse(density), weight * (sample.pdf * inverse(density))
+            )
+        else:
+            weight *= inverse(chosen)
+        found = active & (density > 0) & dr.isfinite(density) & (entering | (sample.pdf > 0))
+        found &= scene.ray_test(ray, found) ^ True
+        return direction, dr.select(found, density, 0), delta, dr.select(found, weight, 0), light

@@ -1,0 +1,265 @@
+"""Learns a guide from paths that start all over a room.
+
+Every vertex of a path tells what the light that it asked gave, and what came from the direction that it went on in.
+Each pass is guided by what those before it have found.
+"""
+
+# mypy: disable-error-code="no-untyped-def, misc"
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from gibench.rendering.backend import is_scalar, tracing
+from gibench.rendering.free_space import NoFreeSpace, beginnings, free_space, surroundings
+from gibench.rendering.guiding.directions import BINS, bin_of
+from gibench.rendering.guiding.grid import FACES, Grid
+from gibench.rendering.guiding.guide import Distributions, Guide, lights_of
+from gibench.rendering.sampling import IndependentSampler
+
+SEED = 0
+"""A guide is part of the scene to all frames, workers and methods."""
+
+LANES = 1 << 18
+"""Paths at a time."""
+
+PASSES = (1, 2, 4)
+"""How many times LANES paths a pass has."""
+
+DEPTH = 8
+"""Scattering events of the paths."""
+
+SHARE = 0.4
+"""Of the directions at a diffuse surface that the guide chooses; the other ones bound what it can spoil."""
+
+SPREAD = 0.5
+"""Of the guide's directions that follow the root of the second moment of what they bring, which has more regard for
+what is bright and rare; the others follow the mean (Rath et al. 2020)."""
+
+FLOOR = 0.1
+"""Of the guide's directions that are spread evenly."""
+
+LIGHT_FLOOR = 0.1
+"""Of the light samples that are spread over the lights as they would be without a guide."""
+
+DOUBT = 64
+"""Samples of a place at which the guide chooses half of its share: few of them tell little of 256 directions."""
+
+PRIOR = 16
+"""A place counts the mean of the 27 cells around it as this many samples of its own."""
+
+FEWEST = 8
+"""Samples of the first pass that make a place known."""
+
+MARGIN = 0.6
+"""Metres from the free space of a room to the edge of the grid."""
+
+NONE = 0xFFFFFFFF
+
+
+class Recorder:
+    """Takes down the vertices of a launch of paths, one slot for each depth of a lane."""
+
+    def __init__(self, grid: Grid, guide: Guide, lanes: int) -> None:
+        """lanes: paths that are launched."""
+        self._grid, self._guide, self._lanes = grid, guide, lanes
+        self._lane = dr.arange(mi.UInt32, lanes)
+        size = lanes * DEPTH
+        self.place = dr.full(mi.UInt32, NONE, size)
+        self.direction, self.light = dr.full(mi.UInt32, NONE, size), dr.full(mi.UInt32, NONE, size)
+        self.density, self.throughput, self.before, self.lit = (dr.zeros(mi.Float, size) for _ in range(4))
+        self.arrays = [self.place, self.direction, self.light]
+        self.arrays += [self.density, self.throughput, self.before, self.lit]
+        dr.eval(self.arrays)
+
+    def vertex(self, row, si, bsdf, direction, pdf, delta, throughput, before, light, lit, depth, active):
+        """Called by the integrator at each vertex that scatters.
+
+        direction: of the bounce, of this density. throughput: up to the vertex; before: radiance found up to it, what
+        the light gives it included. light: number of the light that was asked; lit: reflected radiance that it gives.
+        """
+        normal = dr.mulsign(si.n, dr.dot(si.n, si.to_world(si.wi)))
+        place, inside = self._grid.place(si.p, normal, mi.Vector3f(0))
+        slot = self._lane + (depth - 1) * self._lanes
+        active = active & inside & (depth <= DEPTH)
+        diffuse = mi.has_flag(bsdf.flags(), mi.BSDFFlags.DiffuseReflection) & (delta ^ True)
+        dr.scatter(self.place, place, slot, active)
+        dr.scatter(self.direction, bin_of(direction), slot, active & diffuse)
+        dr.scatter(self.density, pdf, slot, active)
+        dr.scatter(self.throughput, dr.mean(throughput), slot, active)
+        dr.scatter(self.before, dr.mean(before), slot, active)
+        dr.scatter(self.light, light, slot, active)
+        dr.scatter(self.lit, dr.mean(lit) * self._guide.light_probability(row, light, active), slot, active)
+
+
+@dataclass
+class Samples:
+    """Vertices, (N,) each.
+
+    place: number in the grid. direction: bin of the bounce, NONE where the surface is not diffuse; density: of the
+    bounce, per steradian. reflected: radiance that it brought, reflected, over its density. light: number, of the light
+    that was asked, and lit: the radiance of it that is reflected.
+    """
+
+    place: NDArray[np.uint32]
+    direction: NDArray[np.uint32]
+    density: NDArray[np.float32]
+    reflected: NDArray[np.float64]
+    light: NDArray[np.uint32]
+    lit: NDArray[np.float64]
+
+
+def _trace(scene: Any, guide: Guide, starts: Any, count: Any, number: int) -> Samples:
+    from gibench.rendering.integrator import follow_paths
+
+    with tracing():
+        sampler = IndependentSampler()
+        seed = np.random.SeedSequence(SEED, spawn_key=(number,)).generate_state(1)[0]
+        sampler.independent.seed(dr.opaque(mi.UInt32, int(seed)), LANES)
+        recorder = Recorder(guide.grid, guide, LANES)
+        start = dr.minimum(mi.UInt32(sampler.next_1d() * mi.Float(count)), count - 1)
+        ray = mi.Ray3f(
+            dr.gather(mi.Point3f, starts, start), mi.warp.square_to_uniform_sphere(sampler.next_2d())
+        )
+        direct, indirect = follow_paths(
+            scene.mi_scene, sampler.independent, ray, max_depth=DEPTH, guide=guide, recorder=recorder
+        )
+        total = dr.mean(direct + indirect)
+        dr.eval(total, recorder.arrays)
+    known = np.array(recorder.place) != NONE
+    lane = np.tile(np.arange(LANES), DEPTH)[known]
+    place, direction, light, density, throughput, before, lit = (np.array(a)[known] for a in recorder.arrays)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        reflected = (np.array(total)[lane].astype(np.float64) - before) / throughput
+    tells = np.isfinite(reflected) & np.isfinite(lit)
+    reflected, lit = np.where(tells, np.maximum(reflected, 0), 0), np.where(tells, np.maximum(lit, 0), 0)
+    return Samples(place, direction, density, reflected, light, lit.astype(np.float64))
+
+
+class _Sums:
+    """Of all samples so far, by row; row 0 gathers what no place is known for."""
+
+    def __init__(self, shape: tuple[int, ...], place: NDArray[np.uint32], lights: int) -> None:
+        """shape: of the grid. place: of the samples of the first pass."""
+        x, y, z = shape
+        seen = np.bincount(place, minlength=x * y * z * FACES)
+        places = np.flatnonzero(seen >= FEWEST)
+        self.rows = np.zeros(len(seen), dtype=np.uint32)
+        self.rows[places] = np.arange(len(places)) + 1
+        self._near = _neighbours(self.rows.reshape(z, y, x, FACES), places)
+        count = len(places) + 1
+        self.reflected, self.squares = np.zeros((count, BINS)), np.zeros((count, BINS))
+        self.bounces = np.zeros(count)
+        self.lit, self.asked = np.zeros((count, lights)), np.zeros((count, lights))
+
+    def add(self, samples: Samples) -> None:
+        row = self.rows[samples.place].astype(np.int64)
+        went = samples.direction != NONE
+        item = row[went] * BINS + samples.direction[went]
+        brought = samples.reflected[went]
+        for sums, values in (
+            (self.reflected, brought),
+            (self.squares, np.square(brought) * samples.density[went]),
+        ):
+            sums += np.bincount(item, values, minlength=sums.size).reshape(sums.shape)
+        self.bounces += np.bincount(row[went], minlength=len(self.bounces))
+        item = row * self.lit.shape[1] + samples.light
+        self.lit += np.bincount(item, np.square(samples.lit), minlength=self.lit.size).reshape(self.lit.shape)
+        self.asked += np.bincount(item, minlength=self.lit.size).reshape(self.lit.shape)
+
+    def _blended(self, sums: NDArray[np.float64], count: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Means of samples, drawn towards those of the places around."""
+        around = self._near @ sums / np.maximum(self._near @ count, 1)
+        return np.asarray((sums + PRIOR * around) / (count + PRIOR))
+
+    def learned(self, plain: NDArray[np.float64]) -> Distributions:
+        """plain: (L,) probabilities of the lights without a guide."""
+        even = np.full(BINS, 1 / BINS)
+        count = self.bounces[:, None]
+        means, known = _distributions(self._blended(self.reflected, count), even)
+        spreads, _ = _distributions(np.sqrt(self._blended(self.squares, count)), even)
+        directions = (1 - SPREAD) * means + SPREAD * spreads
+        # In proportion to the root of the second moment, the variance of a light's sample is least.
+        lights, _ = _distributions(np.sqrt(self._blended(self.lit, self.asked)), plain)
+        return Distributions(
+            self.rows,
+            (1 - LIGHT_FLOOR) * lights + LIGHT_FLOOR * plain,
+            (1 - FLOOR) * directions + FLOOR * even,
+            np.where(known, SHARE * self.bounces / (self.bounces + DOUBT), 0.0),
+        )
+
+
+def _distributions(
+    values: NDArray[np.float64], otherwise: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Rows divided by their sums, and which of them are known; another distribution where a row is not, as the first.
+
+    values: (E, N), ≥ 0. otherwise: (N,). Divided by the largest first, since sums of huge values overflow.
+    """
+    scaled = values / np.maximum(values.max(axis=1, keepdims=True), np.finfo(np.float64).tiny)
+    total = scaled.sum(axis=1, keepdims=True)
+    known = np.asarray(total[:, 0] > 0)
+    known[0] = False
+    return np.where(known[:, None], scaled / np.where(total > 0, total, 1), otherwise), known
+
+
+def _neighbours(rows: NDArray[np.uint32], places: NDArray[np.int64]) -> Any:
+    """Sparse (E, E): 1 where two rows stand for the same face of cells that touch. rows: (z, y, x, FACES)."""
+    from scipy.sparse import csr_array
+
+    padded = np.pad(rows, ((1, 1), (1, 1), (1, 1), (0, 0)))
+    at = np.stack(np.unravel_index(places, rows.shape))
+    own, near = [], []
+    for step in np.ndindex(3, 3, 3):
+        other = padded[at[0] + step[0], at[1] + step[1], at[2] + step[2], at[3]]
+        own.append(np.arange(len(places))[other > 0] + 1)
+        near.append(other[other > 0])
+    pairs = np.concatenate(own), np.concatenate(near).astype(np.int64)
+    count = len(places) + 1
+    return csr_array((np.ones(len(pairs[0])), pairs), shape=(count, count))
+
+
+def _starts(scene: Any) -> NDArray[np.float64]:
+    """(N, 3) points all over the room; in a scene that encloses nothing, free ones next to its shapes."""
+    try:
+        return free_space(scene)
+    except NoFreeSpace:
+        points = beginnings(scene)
+        return points[surroundings(scene, points)[0]] if len(points) else points
+
+
+def learn(scene: Any) -> Guide | None:
+    """The guide of a `Scene` as it is lit now; None where there is nothing to learn, or under the scalar variant."""
+    if is_scalar() or not lights_of(scene.mi_scene):
+        return None
+    points = _starts(scene)
+    if not len(points):
+        return None
+    portals = scene.portals if scene.portals is not None and float(scene.portals.share[0]) > 0 else None
+    count = len(lights_of(scene.mi_scene))
+    plain = np.full(count, 1 / count)
+    if portals is not None:
+        share = float(portals.share[0])
+        plain = np.append((1 - share) * plain, share)
+    grid = Grid(points.min(axis=0) - MARGIN, points.max(axis=0) + MARGIN)
+    nothing = Distributions(np.zeros(grid.places, np.uint32), plain[None], np.ones((1, BINS)), np.zeros(1))
+    guide = Guide(scene.mi_scene, portals, grid, nothing)
+    starts = mi.Float(points.astype(np.float32).ravel())
+    dr.make_opaque(starts)
+    sums: _Sums | None = None
+    number = 0
+    for launches in PASSES:
+        for _ in range(launches):
+            samples = _trace(scene, guide, starts, dr.opaque(mi.UInt32, len(points)), number)
+            number += 1
+            if sums is None:
+                sums = _Sums(grid.shape, samples.place, len(plain))
+            sums.add(samples)
+        assert sums is not None
+        guide = Guide(scene.mi_scene, portals, grid, sums.learned(plain))
+    return guide

@@ -1,0 +1,121 @@
+"""Noise times time: guided and plain paths against Mitsuba's `path`, in ten rooms by night and by day."""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gibench.rendering.backend import select_variant
+from gibench.rendering.camera import PinholeCamera
+from gibench.rendering.render import render_frame
+from gibench.rendering.scene import GUIDED, load_scene
+from gibench.stress import views
+
+pytestmark = pytest.mark.performance
+
+ROOMS = int(os.environ.get("GIBENCH_NOISE_ROOMS", "10"))
+REPEATS = int(os.environ.get("GIBENCH_NOISE_REPEATS", "12"))
+RESOLUTION, SPP = (96, 64), 64
+
+FRAMES = 24
+"""Frames that share the cost of what a room's guide takes to learn, of 256 × 192 pixels."""
+
+FRAME_PATHS = 256 * 192 * SPP
+
+
+@pytest.fixture(scope="module", autouse=True)
+def variant():
+    return select_variant("auto")
+
+
+def _room(index, folder):
+    from gibench.generators.rooms import sample_room
+    from gibench.generators.scene_files import write_room
+
+    room = sample_room(0, index, views=1, environment="sunsky" if index % 2 else "none")
+    write_room(room, folder)
+    camera = room.cameras[0]
+    return room, load_scene(folder / "scene.xml"), PinholeCamera(camera.position, camera.target, camera.fov)
+
+
+def _cpu_seconds(function):
+    start = time.process_time()
+    result = function()
+    return result, time.process_time() - start
+
+
+def measured(runs, repeats=REPEATS):
+    """Of renderers name → function of a seed and a resolution: (relative variance, the same without the 1 % noisiest
+    pixels, 99.9th percentile of the error, CPU seconds of a frame less those of a frame of next to nothing)."""
+    images = {name: [] for name in runs}
+    seconds = {name: [] for name in runs}
+    fixed = {}
+    for name, run in runs.items():
+        run(999, RESOLUTION)
+        fixed[name] = min(_cpu_seconds(lambda run=run: run(1, (4, 4)))[1] for _ in range(3))
+    for seed in range(repeats):
+        for name, run in runs.items():
+            image, taken = _cpu_seconds(lambda run=run, seed=seed: run(seed, RESOLUTION))
+            images[name].append(image)
+            seconds[name].append(taken - fixed[name])
+    values = {name: np.array(list_, dtype=float).reshape(repeats, -1, 3) for name, list_ in images.items()}
+    mean = np.mean([v.mean(axis=0) for v in values.values()], axis=0)
+    scale = mean**2 + 0.01 * mean.mean() ** 2
+    found = {}
+    for name, value in values.items():
+        variance = (value.var(axis=0, ddof=1) / scale).mean(axis=1)
+        quiet = np.sort(variance)[: int(0.99 * len(variance))]
+        error = np.abs(value - mean).mean(axis=2) / np.sqrt(scale.mean(axis=1))
+        found[name] = (
+            variance.mean(), quiet.mean(), np.quantile(error, 0.999), float(np.median(seconds[name]))
+        )  # fmt: skip
+    return found
+
+
+def test_guided_and_plain_against_path(tmp_path):
+    ratios = {}
+    for index in range(ROOMS):
+        room, scene, camera = _room(index, tmp_path / str(index))
+        guided = replace(scene, sampling=GUIDED)
+        _, learning = _cpu_seconds(lambda guided=guided: guided.guide)
+
+        def ours(scene, camera=camera):
+            return lambda seed, resolution: render_frame(
+                scene, camera, resolution=resolution, spp=SPP, seed=seed, channels=["color"]
+            ).arrays["color"]
+
+        runs = {
+            "path": lambda seed, resolution, scene=scene, camera=camera: views.render_path(
+                scene.mi_scene, camera, resolution, spp=SPP, seed=seed, max_depth=8, rr_depth=5
+            ),
+            "plain": ours(scene),
+            "guided": ours(guided),
+        }
+        if room.environment.kind != "none" and len(room.openings):
+            runs["plain, no portals"] = ours(replace(scene, openings=None))
+        found = measured(runs)
+        base = found["path"]
+        sky = "day" if room.environment.kind != "none" else "night"
+        print(f"\nroom {index}: {room.kind}, {sky}; guide learned in {learning:.1f} CPU s")
+        for name, (variance, quiet, worst, seconds) in found.items():
+            paths = RESOLUTION[0] * RESOLUTION[1] * SPP
+            shared = learning * paths / (FRAMES * FRAME_PATHS) if name == "guided" else 0.0
+            slower = (seconds + shared) / base[3]
+            row = (variance / base[0] * slower, quiet / base[1] * slower, worst / base[2], slower)
+            ratios.setdefault(name, []).append(row)
+            print(
+                f"  {name:18} variance {variance:.3f} ({quiet:.3f} trimmed), CPU s {seconds:.2f}, "
+                f"variance x time {row[0]:.2f} ({row[1]:.2f} trimmed), 99.9 % of errors below {worst:.2f}"
+            )
+    print("\nof path, geometric means over rooms (largest):")
+    for name, rows in ratios.items():
+        means, largest = np.exp(np.log(rows).mean(axis=0)), np.max(rows, axis=0)
+        print(
+            f"  {name:18} variance x time {means[0]:.2f} ({largest[0]:.2f}), "
+            f"trimmed {means[1]:.2f} ({largest[1]:.2f}), 99.9 % of errors {means[2]:.2f}, "
+            f"time {means[3]:.2f}; {len(rows)} rooms"
+        )

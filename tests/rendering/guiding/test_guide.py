@@ -1,0 +1,210 @@
+"""Frames with a guide have the mean of frames without, and less noise."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gibench.rendering.camera import PinholeCamera
+from gibench.rendering.render import render_frame
+from gibench.rendering.scene import GUIDED, load_dict
+from tests.rendering import scenes, test_portals
+
+SIDE = 16
+
+INDEPENDENT = 1020
+"""Samples a pixel, 255 independent groups of 4."""
+
+LEARNING = "gibench.rendering.guiding.learning"
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch):
+    """A guide from few paths, which is as unbiased as any."""
+    monkeypatch.setattr(LEARNING + ".LANES", 1 << 14)
+    monkeypatch.setattr(LEARNING + ".PASSES", (1, 2))
+
+
+def many_lamps():
+    """The box with a thousand lamps, most of them behind its back wall."""
+    scene = scenes.box("coat")
+    rng = np.random.default_rng(0)
+    for number in range(1000):
+        centre = [*rng.uniform(-0.9, 0.9, 1), *rng.uniform(-0.9, 4, 1), *rng.uniform(1.2, 1.9, 1)]
+        scene[f"lamp_{number:04}"] = {
+            "type": "sphere",
+            "center": centre,
+            "radius": 0.01,
+            "bsdf": {"type": "ref", "id": "wall"},
+            "emitter": scenes.area(2.0 + number % 7, 2, 1),
+        }
+    return scene
+
+
+def dark(description):
+    """Without its lamp, and with a faint sky."""
+    scene = {name: value for name, value in description.items() if name != "lamp"}
+    return scene | {"sky": {"type": "constant", "radiance": scenes.rgb(0.1)}}
+
+
+def near_mirror():
+    scene = scenes.box("coat")
+    scene["subject"] = {
+        **scenes.two_sided(
+            type="roughplastic",
+            alpha=1e-3,
+            distribution="ggx",
+            int_ior=1.5,
+            diffuse_reflectance=scenes.rgb(0.3),
+        ),
+        "id": "subject",
+    }
+    return scene
+
+
+def point_lamp():
+    scene = scenes.box("diffuse")
+    scene["spot"] = {"type": "point", "position": [0.3, -0.2, 1.4], "intensity": scenes.rgb(1.0)}
+    return scene
+
+
+SCENES = {
+    "coat": lambda: load_dict(scenes.box("coat")),
+    "metal": lambda: load_dict(scenes.box("metal")),
+    "mirror": lambda: load_dict(scenes.box("mirror")),
+    "near-mirror": lambda: load_dict(near_mirror()),
+    "point lamp": lambda: load_dict(point_lamp()),
+    "a thousand lamps": lambda: load_dict(many_lamps()),
+    "sky alone": lambda: load_dict(dark(scenes.box("coat"))),
+    "portals": lambda: replace(load_dict(test_portals.room()), openings=test_portals.OPENINGS_OF_ROOM),
+}
+
+
+def frame(scene, camera=scenes.CAMERA, **options):
+    given = {
+        "resolution": (SIDE, SIDE),
+        "channels": ["radiance"],
+        "spp": INDEPENDENT,
+        "max_depth": 6,
+    } | options
+    return render_frame(scene, camera, **given).arrays
+
+
+def z_scores(one, other):
+    """Differences of two frames in standard errors, green alone, where either has any."""
+    error = np.hypot(one["color_se"][..., 1].astype(float), other["color_se"][..., 1])
+    difference = one["color"][..., 1].astype(float) - other["color"][..., 1]
+    assert (difference[error == 0] == 0).all()
+    return difference[error > 0] / error[error > 0]
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_same_mean(name):
+    plain = SCENES[name]()
+    camera = PinholeCamera((0.0, -0.8, 1.0), (0.3, 1.0, 0.8), 1.2) if name == "portals" else scenes.CAMERA
+    guided = replace(plain, sampling=GUIDED)
+    assert guided.guide is not None
+    few = (
+        {"resolution": (8, 8), "spp": 252} if name == "a thousand lamps" else {}
+    )  # Mitsuba is slow with them
+    z = z_scores(frame(guided, camera, seed=1, **few), frame(plain, camera, seed=2, **few))
+    assert abs(z.mean()) < 4 / np.sqrt(len(z))
+    # Also the errors are what they say, on both sides.
+    assert 0.85 < z.std() < 1.15
+    assert np.abs(z).max() < 6
+
+
+def test_parts_have_the_same_means():
+    plain = load_dict(near_mirror())
+    guided = replace(plain, sampling=GUIDED)
+    names = ["direct_diffuse", "direct_specular", "indirect_diffuse", "indirect_specular"]
+
+    def means(scene, first):
+        frames = [frame(scene, seed=first + s, spp=256, channels=names) for s in range(8)]
+        return np.array([[f[n].mean(dtype=float) for n in names] for f in frames])
+
+    one, other = means(guided, 0), means(plain, 100)
+    error = np.sqrt((one.var(axis=0, ddof=1) + other.var(axis=0, ddof=1)) / 8)
+    assert (np.abs(one.mean(axis=0) - other.mean(axis=0)) < 4.5 * error).all()
+
+
+def test_closed_furnace():
+    """All that shines and reflects alike: every pixel of a converged frame is the closed form."""
+    from gibench.stress.scenes import closed_answer, closed_box
+    from gibench.stress.views import INSIDE
+
+    scene = replace(load_dict(closed_box(0.6, 1.0)), sampling=GUIDED)
+    got = frame(scene, INSIDE, max_depth=4)
+    error = got["color_se"].astype(float)
+    z = (got["color"] - closed_answer(0.6, 1.0, 4))[error > 0] / error[error > 0]
+    assert abs(z.mean()) < 4 / np.sqrt(len(z) / 3)
+    np.testing.assert_allclose(got["color"].mean(), closed_answer(0.6, 1.0, 4), rtol=0.01)
+
+
+def test_a_guide_of_one_path_is_unbiased(monkeypatch):
+    monkeypatch.setattr(LEARNING + ".LANES", 1)
+    monkeypatch.setattr(LEARNING + ".PASSES", (1,))
+    monkeypatch.setattr(LEARNING + ".FEWEST", 1)
+    plain = load_dict(scenes.box("coat"))
+    z = z_scores(frame(replace(plain, sampling=GUIDED), seed=1), frame(plain, seed=2))
+    assert abs(z.mean()) < 4 / np.sqrt(len(z))
+    assert np.abs(z).max() < 6
+
+
+def test_a_guide_out_of_date_is_unbiased():
+    """Learned under one lamp, used when another shines in its place."""
+    import mitsuba as mi
+
+    description = scenes.box("coat")
+    description["other"] = scenes.rectangle(
+        [0.95, 0, 1], [-1, 0, 0], (0.2, 0.2), bsdf={"type": "ref", "id": "wall"}, emitter=scenes.area(0.0)
+    )
+    plain = load_dict(description)
+    guided = replace(plain, sampling=GUIDED)
+    assert guided.guide is not None
+    parameters = mi.traverse(plain.mi_scene)
+    parameters["lamp.emitter.radiance.value"] = mi.Color3f(0.0)
+    parameters["other.emitter.radiance.value"] = mi.Color3f(9.0)
+    parameters.update()
+    z = z_scores(frame(guided, seed=1), frame(plain, seed=2))
+    assert abs(z.mean()) < 4 / np.sqrt(len(z))
+    assert np.abs(z).max() < 6
+
+
+def test_a_black_room_teaches_nothing_that_does_harm():
+    import mitsuba as mi
+
+    plain = load_dict(scenes.box("coat"))
+    parameters = mi.traverse(plain.mi_scene)
+    parameters["lamp.emitter.radiance.value"] = mi.Color3f(0.0)
+    parameters.update()
+    guided = replace(plain, sampling=GUIDED)
+    assert not frame(guided, spp=16)["color"].any()
+    parameters["lamp.emitter.radiance.value"] = mi.Color3f(8.0, 7.0, 6.0)
+    parameters.update()
+    z = z_scores(frame(guided, seed=1), frame(plain, seed=2))
+    assert abs(z.mean()) < 4 / np.sqrt(len(z))
+
+
+def test_without_a_light_there_is_no_guide():
+    description = {name: value for name, value in scenes.box("coat").items() if name != "lamp"}
+    scene = replace(load_dict(description), sampling=GUIDED)
+    assert scene.guide is None
+    assert not frame(scene, spp=4)["color"].any()
+
+
+def test_a_lamp_behind_a_baffle_has_less_noise(monkeypatch):
+    """Light that only second bounces find is what a guide is for."""
+    monkeypatch.setattr(LEARNING + ".LANES", 1 << 16)
+    description = scenes.box("diffuse")
+    description["baffle"] = scenes.rectangle(
+        [0, 0, 1.9], [0, 0, -1], (0.4, 0.4), bsdf={"type": "ref", "id": "wall"}
+    )
+    plain = load_dict(description)
+
+    def variance(scene):
+        return np.median(np.square(frame(scene)["color_se"].astype(float)))
+
+    assert variance(replace(plain, sampling=GUIDED)) < 0.7 * variance(plain)
