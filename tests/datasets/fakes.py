@@ -99,11 +99,11 @@ class Setup:
             time.sleep(self.slow)
             return render_frame(scene, camera, **settings)
 
-        scene = SimpleNamespace(materials=("oak",), shapes=("floor.0",))
+        scene = SimpleNamespace(materials=("oak",), shapes=("floor.0",), guide=None)
         modules = {
             "gibench.generators.rooms": {"sample_room": sampled, "RejectedRoom": RejectedRoom},
             "gibench.generators.scene_files": {"write_room": write_room, "lighting_record": None},
-            "gibench.rendering.scene": {"load_scene": lambda path, share_kernels: scene},
+            "gibench.rendering.scene": {"load_scene": lambda path, share_kernels, sampling: scene},
             "gibench.rendering.render": {"render_frame": rendered},
         }
         for name, content in modules.items():
