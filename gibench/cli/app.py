@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from gibench.cli import bench, convert, dataset, doctor, exporting, stress
+from gibench.cli import bench, convert, dataset, doctor, environments, exporting, stress
 
 app = typer.Typer(
     name="gibench",
@@ -17,6 +17,7 @@ app.add_typer(dataset.app, name="dataset")
 app.add_typer(bench.app, name="bench")
 app.command("convert")(convert.convert)
 app.command("doctor")(doctor.doctor)
+app.command("environments")(environments.environments)
 app.command("stress")(stress.stress)
 
 make_app = typer.Typer(name="make-dataset", add_completion=False, pretty_exceptions_enable=False)

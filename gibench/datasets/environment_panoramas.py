@@ -1,0 +1,149 @@
+"""Panoramas of generated rooms: environments to train on, as many as are wanted."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gibench.datasets.errors import FolderError, MakingError
+from gibench.datasets.files import as_json, write_whole
+
+if TYPE_CHECKING:
+    from gibench.generators.parts import Room
+    from gibench.rendering.scene import Scene
+
+LANE = 2001
+"""Of the seeds of these rooms, so that no dataset of the same seed has one of them."""
+
+FACE = 96
+"""Texels along the faces of the cube that is rendered, half as many again as the panorama has at the horizon."""
+
+HEIGHT = 128
+MAX_DEPTH = 8
+
+RECORD = "environments.json"
+"""Beside the panoramas: what decides their pixels."""
+
+
+def room_seed(seed: int) -> int:
+    """Of the rooms whose panoramas the run `seed` makes."""
+    return int(
+        np.random.SeedSequence(seed, spawn_key=(LANE,)).generate_state(1, np.uint64)[0] >> np.uint64(1)
+    )
+
+
+def make_environments(
+    out: Path, *, count: int, seed: int, spp: int, on_done: Callable[[int, int], None] | None = None
+) -> list[Path]:
+    """Render `count` panoramas of 256 × 128 texels into a folder, or those that are not there yet.
+
+    Room i of the run shows from the place of its first camera, with its lamps and its daylight; a room that cannot be
+    built is left out, and one more is taken. The same seed, number of samples, variant and versions give the same
+    pixels. Returns the files, OpenEXR, radiance in W·m⁻²·sr⁻¹.
+
+    Raises FolderError for a folder of other settings or one that cannot be written, MakingError when most rooms fail.
+    """
+    from gibench.generators.layouts.placement import RejectedRoom
+    from gibench.generators.rooms import sample_room
+
+    _claimed(out, {"seed": seed, "spp": spp, "height": HEIGHT})
+    files: list[Path] = []
+    number = 0
+    while len(files) < count:
+        if number > 2 * count + 10:
+            raise MakingError(f"{number - len(files)} of {number} rooms could not be built")
+        file = out / f"room-{seed}-{number:05d}.exr"
+        if not file.is_file():
+            try:
+                room = sample_room(room_seed(seed), number, views=1)
+            except RejectedRoom:
+                number += 1
+                continue
+            _written(file, rendered_panorama(room, spp=spp, seed=seed))
+        files.append(file)
+        number += 1
+        if on_done is not None:
+            on_done(len(files), count)
+    return files
+
+
+def rendered_panorama(room: Room, *, spp: int, seed: int) -> NDArray[np.float32]:
+    """What is seen in all directions from the first camera of a room: (128, 256, 3) radiance, laid out as `latlong`."""
+    from gibench.generators.scene_files import write_room
+    from gibench.rendering.scene import load_scene
+
+    with tempfile.TemporaryDirectory(prefix="gibench-") as scratch:
+        write_room(room, scratch, max_depth=MAX_DEPTH + 1)
+        scene = load_scene(Path(scratch) / "scene.xml", share_kernels=True)
+    return panorama_from(scene, room.cameras[0].position, spp=spp, seed=seed + room.index)
+
+
+def panorama_from(
+    scene: Scene, position: tuple[float, float, float], *, spp: int, seed: int
+) -> NDArray[np.float32]:
+    """(128, 256, 3) denoised radiance from a place in a scene, all directions, from six views of a cube."""
+    from gibench.rendering.camera import PinholeCamera
+    from gibench.rendering.cubemap import FACES, cube_directions, to_latlong
+    from gibench.rendering.render import render_frame
+
+    towards = cube_directions(FACE)
+    faces = np.empty((6, FACE, FACE, 3), dtype=np.float32)
+    for number in range(len(FACES)):
+        axis = towards[number].mean(axis=(0, 1))
+        target = np.asarray(position) + axis
+        camera = PinholeCamera(position, (float(target[0]), float(target[1]), float(target[2])), np.pi / 2)
+        frame_seed = int(np.random.SeedSequence(seed, spawn_key=(LANE, number)).generate_state(1)[0])
+        color = render_frame(
+            scene,
+            camera,
+            resolution=(FACE, FACE),
+            channels=("color",),
+            spp=spp,
+            seed=frame_seed,
+            max_depth=MAX_DEPTH,
+            denoise=True,
+        ).arrays["color"]
+        # A camera that looks up or down has another side on top than the face.
+        x, y, _ = camera.project(np.asarray(position) + towards[number], (FACE, FACE))
+        faces[number] = color[np.floor(y).astype(int), np.floor(x).astype(int)]
+    return to_latlong(faces, HEIGHT)
+
+
+def _claimed(out: Path, settings: dict[str, Any]) -> None:
+    """Make the folder and say in it what decides its pixels. Raises FolderError."""
+    record = out / RECORD
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        if record.is_file():
+            made = json.loads(record.read_text(encoding="utf-8"))
+            if made != settings:
+                raise FolderError(
+                    f"{out} holds panoramas of other settings ({made}): choose another folder with --out"
+                )
+        elif any(out.iterdir()):
+            raise FolderError(f"{out} holds something else: choose a new folder with --out")
+        else:
+            write_whole(record, as_json(settings))
+    except OSError as problem:
+        raise FolderError(f"{problem.filename or out}: {problem.strerror}") from None
+    except ValueError:
+        raise FolderError(f"{record} is damaged: remove the folder, or choose another with --out") from None
+
+
+def _written(file: Path, image: NDArray[np.float32]) -> None:
+    import OpenEXR
+
+    with tempfile.TemporaryDirectory(prefix="gibench-") as scratch:
+        header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+        OpenEXR.File(header, {"RGB": np.ascontiguousarray(image)}).write(f"{scratch}/panorama.exr")
+        content = (Path(scratch) / "panorama.exr").read_bytes()
+    try:
+        write_whole(file, content)
+    except OSError as problem:
+        raise FolderError(f"{problem.filename or file}: {problem.strerror}") from None
