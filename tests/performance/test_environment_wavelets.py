@@ -1,0 +1,42 @@
+"""How much of the light of environments few wavelets hold: rendered panoramas beside real maps."""
+
+import numpy as np
+import pytest
+
+from gibench.baselines.wavelets.haar import haar
+from gibench.baselines.wavelets.selection import POWERS, energy_kept, largest
+from gibench.datasets.environment_panoramas import make_environments
+from gibench.generators.environments.files import environment_files, read_environment
+from gibench.rendering.cubemap import to_cubemap
+
+pytestmark = pytest.mark.performance
+
+WAVELETS = 64
+
+
+def kept(files):
+    """(maps, weightings) share of the energy that the largest coefficients hold."""
+    shares = []
+    for entry in files:
+        coefficients = haar(to_cubemap(read_environment(entry.path), 64).astype(np.float64))
+        shares.append([energy_kept(coefficients, largest(coefficients, WAVELETS, w)) for w in POWERS])
+    return np.array(shares)
+
+
+def test_energy_in_64_wavelets(tmp_path):
+    make_environments(tmp_path / "maps", count=8, seed=7, spp=64)
+    sets = {
+        "indoor": environment_files("indoor"),
+        "outdoor": environment_files("outdoor"),
+        "rendered": environment_files(str(tmp_path / "maps")),
+    }
+    shares = {name: kept(files) for name, files in sets.items()}
+    for name, values in shares.items():
+        told = ", ".join(
+            f"{weighting} {100 * mean:.0f} %"
+            for weighting, mean in zip(POWERS, values.mean(axis=0), strict=True)
+        )
+        print(f"{name} ({len(values)}): {told}; from {values[:, 0].min():.2f} to {values[:, 0].max():.2f}")
+    # Rendered rooms spread as the real ones do: none of them is emptier of wavelets than all real maps.
+    real = np.concatenate([shares["indoor"], shares["outdoor"]])
+    assert real[:, 0].min() - 0.15 < shares["rendered"][:, 0].mean() < real[:, 0].max()
