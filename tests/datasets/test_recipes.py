@@ -151,3 +151,27 @@ def test_stills_that_are_held_out_go_with_the_path():
 
 def test_recipes_without_held_out_stills_are_what_they_were():
     assert not {"held_out", "path_rooms", "rendered"} & check_recipe({"views": 5}).identity().keys()
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        (b"views = " + b"[" * 5000 + b"]" * 5000, "too many brackets"),
+        (b"views = " + b"9" * 5000, "no valid TOML"),
+        (b'environment = "' + b"x" * 5000 + b'"', "there is no file"),
+        (b'environment = "a\\u0000b"', "no name of a file"),
+        (b"scenes = [1, 2]", r"scenes: \[1, 2\] is not allowed"),
+        (b'scenes = ["a.xml", 5]', "scenes: .* is not allowed"),
+        (b"views = \xff", "no valid TOML"),
+    ],
+)
+def test_whatever_a_recipe_holds_is_answered_in_a_line(tmp_path, content, says):
+    (tmp_path / "r.toml").write_bytes(content)
+    with pytest.raises(RecipeError, match=says) as refused:
+        load_recipe(tmp_path / "r.toml")
+    assert "\n" not in str(refused.value)
+
+
+def test_a_byte_order_mark_is_skipped(tmp_path):
+    (tmp_path / "r.toml").write_bytes(b"\xef\xbb\xbfviews = 3\n")
+    assert load_recipe(tmp_path / "r.toml").views == 3

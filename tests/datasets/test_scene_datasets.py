@@ -200,3 +200,33 @@ def test_converting_says_what_was_done_and_can_be_done_again(tmp_path, capsys):
     assert run(app, ["convert", str(tmp_path / "new/scene.xml"), "--out", str(tmp_path / "again")]) == 0
     assert "new: z up, 0 changes" in capsys.readouterr().out
     assert "is there already" in refused(capsys, "convert", old, "--out", tmp_path / "new", to=app)
+
+
+def test_a_scene_without_a_place_for_cameras_does_not_stop_the_others(scene, tmp_path, capsys):
+    flat = written(tmp_path / "flat", SQUARE + '<emitter type="constant"/>', version="3.0.0")
+    words = [
+        "--scene",
+        str(flat),
+        "--scene",
+        str(scene),
+        "--views",
+        "1",
+        *SMALL,
+        "--out",
+        str(tmp_path / "d"),
+    ]
+    assert run(make_app, words) == 0
+    assert "left out      room 0: " in capsys.readouterr().out.replace("\n", " ")
+    assert set(open_dataset(tmp_path / "d").frames["room"]) == {1}
+    assert run(make_app, ["--scene", str(flat), "--views", "1", *SMALL, "--out", str(tmp_path / "e")]) == 2
+    assert "no place for a camera" in capsys.readouterr().err
+
+
+def test_a_scene_that_mitsuba_refuses_is_a_mistake_of_its_author(tmp_path, capsys):
+    bad = '<shape type="sphere"><bsdf type="diffuse"><float name="nobody" value="1"/></bsdf></shape>'
+    camera = '<sensor type="perspective"><transform name="to_world"><translate z="5"/></transform></sensor>'
+    file = written(tmp_path, camera + "\n" + bad, version="3.0.0")
+    assert run(make_app, ["--scene", str(file), "--views", "0", *SMALL, "--out", str(tmp_path / "d")]) == 2
+    assert "scene.xml:3: the bsdf diffuse has no property nobody: remove it" in " ".join(
+        capsys.readouterr().err.split()
+    )

@@ -13,9 +13,17 @@ import pytest
 from gibench.cli import run
 from gibench.cli.app import app, make_app
 from gibench.datasets.recipes import Recipe
+from gibench.generators.imported.analytic import MESHES
+from gibench.generators.imported.images import MOST_PIXELS
 from gibench.generators.imported.own_cameras import read_camera_file
+from gibench.generators.imported.parsing import MOST_ELEMENTS, MOST_INCLUDES
+from gibench.generators.imported.scene import import_scene
+from gibench.generators.imported.shapes import MOST_SHAPES
+from gibench.generators.imported.shipped import shipped
 from gibench.generators.imported.survey import CLEARANCE
 from gibench.generators.imported.upgrading import LEGACY, RULES
+
+from .files import SQUARE, one, upgraded, written
 
 PAGE = Path(__file__).parents[3] / "docs/scenes.md"
 
@@ -95,3 +103,59 @@ def test_the_camera_file_is_one(tmp_path):
 
 def test_the_distance_to_things_is_that_of_the_code():
     assert f"{CLEARANCE} m away" in " ".join(text().split())
+
+
+def cells(row: str) -> list[str]:
+    """Cells of a row of the table of what is read, replaced, left out and refused, by the row's first."""
+    lines = [line for line in text().splitlines() if line.startswith(f"| {row} |")]
+    assert len(lines) == 1, row
+    return [cell.strip() for cell in lines[0].strip("|").split("|")]
+
+
+def names(cell: str) -> set[str]:
+    return set(re.findall(r"`(\w+)`", cell))
+
+
+def test_what_is_said_to_be_replaced_is_what_the_rules_replace(tmp_path):
+    """Every plugin of the table that Mitsuba 3 has not comes in, as another one; every one that is left out goes."""
+    inner = '<bsdf type="diffuse"/>'
+    inside = {
+        "coating": inner,
+        "roughcoating": inner,
+        "mixturebsdf": '<string name="weights" value="1"/>' + inner,
+    }
+    for name in names(cells("materials")[2]):
+        body = f'<shape type="sphere"><bsdf type="{name}">{inside.get(name, "")}</bsdf></shape>'
+        root, changes = upgraded(tmp_path, body)
+        assert name not in shipped()
+        assert name not in {node.type for node in root.everything()}, name
+        assert any(name in change.what for change in changes), name
+    for name in names(cells("lights")[2]):
+        root, changes = upgraded(tmp_path, f'<emitter type="{name}"/>{SQUARE}')
+        assert one(root, "emitter").type in shipped()
+        assert any(name in change.what for change in changes), name
+    for name in names(cells("textures")[2]) - {"scale", "channel"}:
+        body = f'<shape type="sphere"><bsdf type="diffuse"><texture type="{name}" name="reflectance"/></bsdf></shape>'
+        root, changes = upgraded(tmp_path, body)
+        assert one(root, "texture").type in shipped()
+        assert any(name in change.what for change in changes), name
+    for name in names(cells("media")[3]):
+        body = f'<shape type="sphere"><{name} type="homogeneous"/></shape>'
+        root, changes = upgraded(tmp_path, body, version="3.0.0")
+        assert name not in {node.tag for node in root.everything()}
+        assert [change.loss for change in changes] == [True]
+
+
+def test_what_is_said_of_shapes_is_what_the_import_makes(tmp_path):
+    replaced = names(cells("shapes")[2]) - {"sdfgrid", "obj", "instance", "shapegroup"}
+    assert replaced == set(MESHES)
+    for name in replaced:
+        scene = import_scene(written(tmp_path, f'<shape type="{name}"/>', version="3.0.0"))
+        assert one(scene.tree.root, "shape").type == "ply"
+
+
+def test_the_limits_are_those_of_the_code():
+    said = " ".join(cells("files")[4].replace("a million", "1000000").split())
+    for limit in (MOST_INCLUDES, MOST_ELEMENTS, MOST_SHAPES):
+        assert str(limit) in said, limit
+    assert f"{MOST_PIXELS // 10**6} million pixels" in cells("textures")[4]
