@@ -22,7 +22,7 @@ def expand_instances(root: Node, note: Note) -> None:
     groups = {node.get("id", ""): node for node in root.nodes("shape") if node.type == "shapegroup"}
     instances = [node for node in root.nodes("shape") if node.type == "instance"]
     group_of = {id(node): _group(node, groups) for node in instances}
-    sizes = {id(group): len(group.nodes("shape")) for group in group_of.values()}
+    sizes = {key: len(group.nodes("shape")) for key, group in {id(g): g for g in group_of.values()}.items()}
     count = len(root.nodes("shape")) + sum(sizes[id(group_of[id(node)])] for node in instances)
     if count > MOST_SHAPES:
         raise SceneFileError(
