@@ -17,7 +17,7 @@ def write_and_tell(results: Sequence[Path], out: Path | None, archive: Path | No
     TrackError for options that contradict each other, ReportError, ResultsError, or GibenchError where the disk
     refuses.
     """
-    from gibench.benchmarks.errors import TrackError
+    from gibench.benchmarks.errors import ResultsError, TrackError
     from gibench.benchmarks.report import write_report
     from gibench.benchmarks.report.archive import pack, unpack
     from gibench.benchmarks.results import load
@@ -34,6 +34,11 @@ def write_and_tell(results: Sequence[Path], out: Path | None, archive: Path | No
         if out is None and archive is None:
             raise TrackError("name a folder with --out, or a file with --archive, or both")
         loaded = [load(folder) for folder in results]
+        for one in loaded:
+            for record in one.records():
+                if record["status"] == "ok" and (changed := one.folder.changed_frame(record)):
+                    file = one.folder.result_file(record["id"])
+                    raise ResultsError(f"{file}: {changed}: remove it and run the same command again")
         if out is not None:
             write_report(loaded, out)
             say(str(out / "index.html"))

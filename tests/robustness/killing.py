@@ -144,13 +144,13 @@ def killed(name: str, kills: int, seed: int, seconds: float = float("inf")) -> O
             with contextlib.suppress(subprocess.TimeoutExpired):
                 process.communicate(timeout=delay)
             who = kill(process, rng)
-            if who == "worker":  # the command goes on, with another worker or a result that failed by a kill
-                process.communicate(timeout=1200)
-            process.communicate(timeout=60)
+            # Without its command everything must end soon. Without a worker, or with nothing to kill, it goes on.
+            process.communicate(timeout=60 if who in ("command", "group") else 1200)
             what = f"kill {outcome.kills} ({who} after {delay:.2f} s)"
             if who:
                 outcome.kills += 1
                 in_a_row += 1
+                print(f"{name}: {what}", file=sys.stderr, flush=True)
             after = _failed_by_kill_removed(command, root) if root.exists() else {}
             for file, content in bytes_before.items():
                 if file not in after or _content(root, file) != content:
