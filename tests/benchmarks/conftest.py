@@ -36,7 +36,7 @@ TINY = {
                 "path_views": 3,
                 "kinds": ["living"],
             },
-            "training": {"spp": 2, "channels": ["color", "albedo"]},
+            "training": {"spp": 2, "channels": ["color", "albedo", "normal"]},
             "reference": {
                 "spp": 64,
                 "denoise": False,
