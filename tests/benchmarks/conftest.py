@@ -28,7 +28,7 @@ TINY = {
             "rooms": 1,
             "seed": 4,
             "warmup": 1,
-            "budget": {"prepare": 60, "render": 5},
+            "budget": {"prepare": 60, "render": 12},
             "room": {
                 "resolution": [20, 14],
                 "views": 2,
