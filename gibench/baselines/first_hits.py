@@ -10,7 +10,7 @@ import drjit as dr
 import mitsuba as mi
 
 from gibench.rendering.camera import PinholeCamera, RayGenerator
-from gibench.rendering.integrator import NOT_DIFFUSE
+from gibench.rendering.lobes import NOT_DIFFUSE
 from gibench.rendering.scene import Scene
 
 

@@ -20,6 +20,7 @@ import mitsuba as mi
 
 from gibench.rendering.backend import is_scalar
 from gibench.rendering.light_sampling import emission, emission_weight, inverse, mis_weight, sample_light
+from gibench.rendering.lobes import DIFFUSE, NOT_DIFFUSE, diffuse_lobe, split
 
 RR_DEPTH = 2
 """Scattering events after which Russian roulette may end a path. Variance times time over three furnished rooms is 7 to
@@ -45,20 +46,6 @@ class PathSample:
     normal: Any = None
 
 
-_DIFFUSE = mi.BSDFFlags.DiffuseReflection
-NOT_DIFFUSE = int(mi.BSDFFlags.All) & ~int(_DIFFUSE)
-"""Mask of all lobes that count as specular."""
-
-
-def _split(bsdf, value, diffuse):
-    """A BSDF's value as the share of its diffuse reflection and that of everything else, both ≥ 0.
-
-    A difference leaves dust of rounding, so what does not exist is set to 0.
-    """
-    other = dr.select((bsdf.flags() & NOT_DIFFUSE) != 0, dr.maximum(value - diffuse, 0), 0)
-    return diffuse, other
-
-
 @cache
 def _black():
     return mi.load_dict({"type": "diffuse", "reflectance": 0.0})
@@ -72,47 +59,6 @@ def bsdf_at(si, ray):
 def shading_normal(si):
     """On the side of the geometric normal, also where a mesh brings normals that contradict its winding."""
     return dr.mulsign(si.sh_frame.n, dr.dot(si.sh_frame.n, si.n))
-
-
-def _principled_diffuse(bsdf, si, wo, active):
-    """The diffuse lobe of `principled` alone, cosine included (Burley 2012, section 5.3; flatness: 2015, section 5.2).
-
-    si, wo: turned to the front. Sheen and coats are other lobes.
-    """
-    number = lambda name: bsdf.eval_attribute_1(name, si, active & bsdf.has_attribute(name, active))  # noqa: E731
-    rough = number("roughness")
-    matte = (1 - number("metallic")) * (1 - number("spec_trans")) * (1 - 0.5 * number("diff_trans"))
-    cos_i, cos_o = dr.maximum(si.wi.z, 0), dr.maximum(wo.z, 0)
-    grazing_i, grazing_o = ((1 - c) ** 5 for c in (cos_i, cos_o))
-    half = dr.dot(dr.normalize(si.wi + wo), wo)
-    retro = 2 * rough * dr.square(half)
-    lobe = (1 - 0.5 * grazing_i) * (1 - 0.5 * grazing_o)
-    lobe += retro * (grazing_o + grazing_i + grazing_o * grazing_i * (retro - 1))
-    inner = dr.lerp(1, 0.5 * retro, grazing_o) * dr.lerp(1, 0.5 * retro, grazing_i)
-    flat = 1.25 * (inner * (inverse(cos_i + cos_o) - 0.5) + 0.5)
-    base = bsdf.eval_attribute("base_color", si, active)
-    value = base * matte * dr.lerp(lobe, flat, number("flatness")) * cos_o * dr.inv_pi
-    return dr.select(active & (cos_i > 0) & (cos_o > 0), value, 0)
-
-
-def _diffuse_lobe(layers, bsdf, context, si, wo, active):
-    """The diffuse reflection of a material, cosine included.
-
-    `principled` evaluates all of its lobes whichever it is asked for, so what it adds is put right by hand.
-    """
-    value = bsdf.eval(context, si, wo, active)
-    if layers is None or not layers.principled:
-        return value
-    front = mi.SurfaceInteraction3f(si)
-    front.wi = mi.Vector3f(si.wi.x, si.wi.y, dr.abs(si.wi.z))
-    wo = mi.Vector3f(wo.x, wo.y, dr.mulsign(wo.z, si.wi.z))
-    excess = mi.Spectrum(0)
-    for part in layers.parts(bsdf, si, active)[0]:
-        on = active & (part.weight > 0)
-        on &= part.bsdf.has_attribute("base_color", on)
-        all_lobes = part.bsdf.eval(context, front, wo, on)
-        excess += dr.select(on, part.weight * (all_lobes - _principled_diffuse(part.bsdf, front, wo, on)), 0)
-    return dr.clip(value - excess, 0, value)
 
 
 def _as_expected(weight):
@@ -270,11 +216,11 @@ def scatter_paths(
     `Scene.layers`, without which all of `principled` counts as diffuse. guide: `Scene.guide`, for less noise. emission
     of the result is 0.
     """
-    by_hand = layers is not None and layers.principled
-    mask = {"all": int(mi.BSDFFlags.All), "diffuse": int(_DIFFUSE), "specular": NOT_DIFFUSE}[lobes]
-    # What ignores the mask is sampled whole and taken apart.
+    by_hand = layers is not None and (layers.principled or layers.masked)
+    mask = {"all": int(mi.BSDFFlags.All), "diffuse": DIFFUSE, "specular": NOT_DIFFUSE}[lobes]
+    # What ignores the lobes that are asked for is sampled whole and taken apart. So is a material with holes, whose
+    # samples Mitsuba weighs wrongly (a coat four times) where the diffuse lobe alone is asked for.
     asked = mi.BSDFContext(mi.TransportMode.Radiance, int(mi.BSDFFlags.All) if by_hand else mask)
-    diffuse = mi.BSDFContext(mi.TransportMode.Radiance, int(_DIFFUSE))
     active = active & si.is_valid() & ((bsdf.flags() & mask) != 0) & (max_depth >= 1)
 
     # The same calls as in the loop, and one more for the diffuse lobe alone: kernels stay small.
@@ -299,13 +245,11 @@ def scatter_paths(
 
     none = mi.Spectrum(0)
     if lobes == "all" or by_hand:
-        value_diffuse, value_other = _split(
-            bsdf, value, _diffuse_lobe(layers, bsdf, diffuse, si, to_light, lit)
-        )
+        value_diffuse, value_other = split(bsdf, value, diffuse_lobe(layers, bsdf, si, to_light, lit))
         smooth = active & (delta ^ True) & (pdf > 0)
-        bounce_diffuse = _diffuse_lobe(layers, bsdf, diffuse, si, si.to_local(direction), smooth)
+        bounce_diffuse = diffuse_lobe(layers, bsdf, si, si.to_local(direction), smooth)
         bounce_diffuse *= dr.select(smooth, inverse(pdf), 0)
-        weight_diffuse, weight_other = _split(bsdf, weight, bounce_diffuse)
+        weight_diffuse, weight_other = split(bsdf, weight, bounce_diffuse)
         if lobes == "diffuse":
             value_other, weight_other = none, none
         elif lobes == "specular":

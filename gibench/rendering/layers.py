@@ -41,7 +41,7 @@ class Layers:
     """The trees below the materials of a scene.
 
     depth: of the deepest one; 0 where all are leaves. principled, transmits: whether a leaf is of one of the classes
-    PRINCIPLED, or lets light through.
+    PRINCIPLED, or lets light through. masked: whether a material has holes.
     """
 
     def __init__(self, bsdfs: list[Any]) -> None:
@@ -49,6 +49,7 @@ class Layers:
         self.depth = 0
         self.principled = False
         self.transmits = False
+        self.masked = False
         self._blends = False
         self._nodes: dict[int, tuple[int, Any, Any]] = {}
         self._etas: dict[int, float] = {}
@@ -90,6 +91,7 @@ class Layers:
                 kind = NESTED
         elif name == "MaskBSDF":
             kind = MASK
+            self.masked = True
         elif name == "BlendBSDF":
             kind = BLEND
             self._blends = True

@@ -85,7 +85,7 @@ def split_sum(scene: Any, alpha: float) -> Check:
     checks = []
     for degrees in (0.1, 45, 80):
         hits = first_hits(scene, spot(degrees), (1, 1))
-        share = mi.Color3f(reflectance.directional_albedo(hits.si, hits.bsdf, hits.active))
+        share = mi.Color3f(reflectance.directional_albedo(scene.layers, hits.si, hits.bsdf, hits.active))
         error = abs(float(np.array(share)[0, 0]) / ggx_albedo(alpha, np.radians(degrees)) - 1)
         bound = 1 / reflectance.SAMPLES
         checks.append(Check("methods", "isg: directional albedo", error, bound, "one of its 64 samples"))

@@ -8,7 +8,17 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-SUBJECTS = ("materials", "lights", "geometry", "cameras", "numbers", "methods", "statistics", "speed")
+SUBJECTS = (
+    "materials",
+    "lights",
+    "geometry",
+    "cameras",
+    "numbers",
+    "methods",
+    "coverings",
+    "statistics",
+    "speed",
+)
 """Modules of this package that hold cases, in the order of the table."""
 
 PARTS = (

@@ -26,7 +26,7 @@ def _gbuffer(scene, lightmap, camera, width: int, height: int):
     glossy = hits.glossy
     surfaces = {
         "glossy": glossy,
-        "reflectance": directional_albedo(hits.si, hits.bsdf, glossy),
+        "reflectance": directional_albedo(scene.layers, hits.si, hits.bsdf, glossy),
         "position": mi.Point3f(hits.si.p),
         "normal": mi.Normal3f(hits.normal),
         "roughness": surface.roughness(scene, hits.bsdf, hits.si, glossy),

@@ -6,32 +6,33 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from gibench.rendering.integrator import NOT_DIFFUSE
+from gibench.rendering.lobes import sample_specular
 
 SAMPLES = 64
 """Of the lobe, a power of two. A few per cent of a rough lobe's half vectors reflect below the horizon, which fewer
 samples miss: 16 are 6 % too bright at GGX alpha 0.2, 64 are 2 %."""
 
 
-def specular_context():
-    """Evaluate everything but the diffuse lobe."""
-    return mi.BSDFContext(mi.TransportMode.Radiance, NOT_DIFFUSE)
+GOLDEN_RATIO = 0.6180339887
+"""Multiples of it fill [0, 1) evenly, and have nothing to do with the bits of the other two dimensions."""
 
 
 @dr.syntax
-def directional_albedo(si, bsdf, active):
+def directional_albedo(layers, si, bsdf, active):
     """Mean of the specular lobe's sample weights at si.wi, mi.Color3f: the split sum's second factor.
 
-    Exact for a mirror, whose only weight is its Fresnel reflectance. The samples are a Hammersley set, the same
-    everywhere, so there is no noise.
+    layers: `Scene.layers`. Exact for a mirror, whose only weight is its Fresnel reflectance. The samples are a
+    Hammersley set, the same everywhere, so there is no noise; a third dimension chooses among lobes and blends.
     """
-    context = specular_context()
     total = mi.Color3f(0)
     sample = mi.UInt32(0)
     while active & (sample < SAMPLES):
         across = (mi.Float(sample) + 0.5) / SAMPLES
         down = mi.Float(dr.brev(sample)) * 2.0**-32 + 0.5 / SAMPLES
-        _, weight = bsdf.sample(context, si, mi.Float(0.5), mi.Point2f(across, down), active)
-        total += weight
+        turns = (mi.Float(sample) + 0.5) * GOLDEN_RATIO
+        which = dr.minimum(turns - dr.floor(turns), dr.one_minus_epsilon(mi.Float))
+        bounce, weight = sample_specular(layers, bsdf, si, which, mi.Point2f(across, down), active)
+        # What goes through, such as a mask's hole, shows something else than the mirror image.
+        total += dr.select(bounce.wo.z * si.wi.z > 0, weight, 0)
         sample += 1
     return total / SAMPLES

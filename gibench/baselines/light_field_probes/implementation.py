@@ -16,7 +16,7 @@ from gibench.baselines.method import Site, View
 from gibench.baselines.probes.baking import ProbeSettings
 from gibench.baselines.probes.maps import load_probes
 from gibench.baselines.replay import Replay, ray_generator
-from gibench.rendering.integrator import NOT_DIFFUSE
+from gibench.rendering.lobes import NOT_DIFFUSE, sample_specular
 
 MAPS = ("light", "distance", "normal")
 
@@ -45,19 +45,19 @@ def light_along(scene, field: LightField, point, direction, metre, active) -> tu
 
 
 @dr.syntax
-def glossy_light(scene, field: LightField, sampler, si, bsdf, active, samples, metre):
+def glossy_light(scene, layers, field: LightField, sampler, si, bsdf, active, samples, metre):
     """What hits reflect towards si.wi by their glossy lobe: mi.Color3f, the mean of `samples` rays through the probes.
 
-    scene: mitsuba.Scene. sampler: mi.Sampler with a lane a hit. samples: mi.UInt32, opaque. Exactly 0 where there is no
-    such lobe. Returns besides, of each hit: rays that no probe could follow, texels that were looked at, and rays.
+    scene: mitsuba.Scene. layers: `Scene.layers`. sampler: mi.Sampler with a lane a hit. samples: mi.UInt32, opaque.
+    Exactly 0 where there is no such lobe. Returns besides, of each hit: rays that no probe could follow, texels that
+    were looked at, and rays.
     """
-    context = mi.BSDFContext(mi.TransportMode.Radiance, NOT_DIFFUSE)
     glossy = active & ((bsdf.flags() & NOT_DIFFUSE) != 0)
     total = mi.Color3f(0)
     lost, looked, traced = mi.UInt32(0), mi.UInt32(0), mi.UInt32(0)
     done = mi.UInt32(0)
     while glossy & (done < samples):
-        bounce, weight = bsdf.sample(context, si, sampler.next_1d(), sampler.next_2d(), glossy)
+        bounce, weight = sample_specular(layers, bsdf, si, sampler.next_1d(), sampler.next_2d(), glossy)
         direction = si.to_world(bounce.wo)
         alive = glossy & (dr.max(weight) > 0)
         light, outcome, effort = light_along(scene, field, si.p, direction, metre, alive)
@@ -74,7 +74,9 @@ def _marched(scene, field: LightField, camera, preliminary, seed, samples, metre
     hits = hits_of_rays(scene, ray_generator(camera), (width, height), preliminary)
     sampler = mi.load_dict({"type": "independent"})
     sampler.seed(seed, width * height)
-    found = glossy_light(scene.mi_scene, field, sampler, hits.si, hits.bsdf, hits.active, samples, metre)
+    found = glossy_light(
+        scene.mi_scene, scene.layers, field, sampler, hits.si, hits.bsdf, hits.active, samples, metre
+    )
     dr.eval(found)
     return found
 

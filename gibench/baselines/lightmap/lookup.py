@@ -13,7 +13,6 @@ import numpy as np
 import OpenEXR
 from numpy.typing import NDArray
 
-from gibench.baselines.lightmap.texel_paths import diffuse_context
 from gibench.baselines.lightmap.unwrapping import NONE, LightmapError
 from gibench.datasets.exr import DARK, fits_half
 from gibench.rendering.scene import Scene
@@ -56,11 +55,12 @@ class Lightmap:
         si: mi.SurfaceInteraction3f; preliminary: the mi.PreliminaryIntersection3f it was computed from. What a hit
         emits is not in it. Shapes without triangles give 0.
         """
+        from gibench.rendering.lobes import diffuse_lobe  # asks Mitsuba for its flags, so a variant is needed
+
         active = active & si.is_valid()
         irradiance = self.irradiance(si, preliminary, active)
-        lobe = si.bsdf().eval(
-            diffuse_context(), si, mi.Vector3f(0, 0, dr.copysign(mi.Float(1), si.wi.z)), active
-        )
+        towards = mi.Vector3f(0, 0, dr.copysign(mi.Float(1), si.wi.z))
+        lobe = diffuse_lobe(self._scene.layers, si.bsdf(), si, towards, active)
         return dr.select(active, irradiance * lobe, 0)
 
     def irradiance(self, si: Any, preliminary: Any, active: Any = True) -> Any:

@@ -32,11 +32,6 @@ BLACK = 1e-6
 """BSDF values below this reflect nothing, and light divided by them would be noise."""
 
 
-def diffuse_context():
-    """Evaluate the diffuse lobe alone."""
-    return mi.BSDFContext(mi.TransportMode.Radiance, int(mi.BSDFFlags.DiffuseReflection))
-
-
 class TexelPoints:
     """The points of a coverage on the device."""
 
@@ -123,9 +118,9 @@ def trace_texels(
 
 def _launch(points, begin, number, start, size, samples, max_depth, seed):
     """Sums over `samples` paths of each of `size` texels: light over lobe, and how many paths tell."""
-    from gibench.rendering.integrator import (
-        scatter_paths,
-    )  # asks Mitsuba for its flags, so a variant is needed
+    # Both ask Mitsuba for its flags, so a variant is needed.
+    from gibench.rendering.integrator import scatter_paths
+    from gibench.rendering.lobes import diffuse_lobe
 
     lanes = size * samples
     levels = (samples.bit_length() - 1) // 2
@@ -135,7 +130,7 @@ def _launch(points, begin, number, start, size, samples, max_depth, seed):
     place = dr.minimum(sampler.next_1d() * among, among - 1)
     si = points.interaction(dr.gather(mi.UInt32, begin, texel) + mi.UInt32(place))
     bsdf = si.bsdf()
-    lobe = bsdf.eval(diffuse_context(), si, mi.Vector3f(0, 0, 1))
+    lobe = diffuse_lobe(points.scene.layers, bsdf, si, mi.Vector3f(0, 0, 1), mi.Bool(True))
     path = scatter_paths(
         points.scene.mi_scene,
         sampler,

@@ -7,19 +7,20 @@ import drjit as dr
 import mitsuba as mi
 
 from gibench.baselines.lightmap.lookup import Lightmap
-from gibench.rendering.integrator import NOT_DIFFUSE, mis_weight
+from gibench.rendering.integrator import mis_weight
+from gibench.rendering.lobes import NOT_DIFFUSE, eval_pdf_sample_specular
 
 
-def _scatter(scene, context, sampler, si, bsdf, active):
-    """One light sample and one sample of the lobes in `context` at a hit.
+def _scatter(scene, layers, sampler, si, bsdf, active):
+    """One light sample and one sample of the specular lobes at a hit.
 
     Returns what the light sample adds, the next ray, its weight, density, and whether it is a mirror's.
     """
     lit = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
     light, radiance = scene.sample_emitter_direction(si, sampler.next_2d(), True, lit)
     lit &= light.pdf != 0
-    value, value_pdf, bounce, weight = bsdf.eval_pdf_sample(
-        context, si, si.to_local(light.d), sampler.next_1d(), sampler.next_2d(), active
+    value, value_pdf, bounce, weight = eval_pdf_sample_specular(
+        layers, bsdf, si, si.to_local(light.d), sampler.next_1d(), sampler.next_2d(), active
     )
     share = dr.select(light.delta, 1, mis_weight(light.pdf, value_pdf))
     seen = dr.select(lit, value * radiance * share, 0)
@@ -28,20 +29,20 @@ def _scatter(scene, context, sampler, si, bsdf, active):
 
 
 @dr.syntax
-def glossy_radiance(scene, lightmap: Lightmap, sampler, si, bsdf, active, samples, bounces):
+def glossy_radiance(scene, layers, lightmap: Lightmap, sampler, si, bsdf, active, samples, bounces):
     """What hits reflect towards si.wi by their glossy lobe, mi.Color3f, the mean of `samples` paths.
 
-    scene: mitsuba.Scene. sampler: mi.Sampler with a lane a hit. samples, bounces: mi.UInt32, opaque. At every hit of a
-    path there is what it emits, which next-event estimation at the hit before shares, and its diffuse light from the
-    lightmap; then, up to `bounces` glossy reflections, its glossy lobe. Exactly 0 where there is no such lobe.
+    scene: mitsuba.Scene. layers: `Scene.layers`. sampler: mi.Sampler with a lane a hit. samples, bounces: mi.UInt32,
+    opaque. At every hit of a path there is what it emits, which next-event estimation at the hit before shares, and its
+    diffuse light from the lightmap; then, up to `bounces` glossy reflections, its glossy lobe. Exactly 0 where there is
+    no such lobe.
     """
-    context = mi.BSDFContext(mi.TransportMode.Radiance, NOT_DIFFUSE)
     glossy = active & ((bsdf.flags() & NOT_DIFFUSE) != 0)
     total = mi.Spectrum(0)
     done = mi.UInt32(0)
 
     while glossy & (done < samples):
-        seen, ray, throughput, pdf, delta = _scatter(scene, context, sampler, si, bsdf, glossy)
+        seen, ray, throughput, pdf, delta = _scatter(scene, layers, sampler, si, bsdf, glossy)
         total += dr.select(dr.all(dr.isfinite(seen)), seen, 0)
         reference = mi.Interaction3f(si)
         bounce = mi.UInt32(1)
@@ -58,7 +59,7 @@ def glossy_radiance(scene, lightmap: Lightmap, sampler, si, bsdf, active, sample
 
             there = hit.bsdf(ray)
             alive &= hit.is_valid() & (bounce < bounces) & ((there.flags() & NOT_DIFFUSE) != 0)
-            seen, ray, weight, pdf, delta = _scatter(scene, context, sampler, hit, there, alive)
+            seen, ray, weight, pdf, delta = _scatter(scene, layers, sampler, hit, there, alive)
             gained += throughput * seen
             total += dr.select(dr.all(dr.isfinite(gained)), gained, 0)
             throughput *= weight

@@ -8,7 +8,7 @@ import pytest
 from gibench.baselines import image_space_gathering as isg
 from gibench.baselines.image_space_gathering.gathering import WIDEST, gather, lobe_angle
 from gibench.baselines.image_space_gathering.pyramid import LEVELS, Layout, MirrorImage, Pyramid
-from gibench.baselines.image_space_gathering.reflectance import directional_albedo, specular_context
+from gibench.baselines.image_space_gathering.reflectance import directional_albedo
 from gibench.baselines.stages import Stages
 from gibench.rendering.render import render_frame
 from gibench.rendering.scene import load_dict
@@ -192,8 +192,11 @@ def test_directional_albedo_against_many_samples(material, cosine):
     count = 1 << 17
     si = dr.zeros(mi.SurfaceInteraction3f, count)
     si.wi = mi.Vector3f(float(np.sqrt(1 - cosine**2)), 0.0, cosine)
-    found = np.array(directional_albedo(si, bsdf, dr.full(mi.Bool, True, count)))[:, 0]
+    from gibench.rendering.layers import Layers
+    from gibench.rendering.lobes import NOT_DIFFUSE, lobes_of
+
+    found = np.array(directional_albedo(Layers([bsdf]), si, bsdf, dr.full(mi.Bool, True, count)))[:, 0]
     rng = np.random.default_rng(0)
     u = mi.Point2f(rng.random((2, count), dtype=np.float32))
-    _, weight = bsdf.sample(specular_context(), si, mi.Float(rng.random(count, dtype=np.float32)), u)
+    _, weight = bsdf.sample(lobes_of(NOT_DIFFUSE), si, mi.Float(rng.random(count, dtype=np.float32)), u)
     np.testing.assert_allclose(found, np.array(weight).mean(axis=1), rtol=0.025)

@@ -1,0 +1,122 @@
+"""The lobes of a material: its diffuse reflection, and everything else, which counts as specular.
+
+Mitsuba's materials evaluate the lobes that a `BSDFContext` asks for, but for `principled`, which evaluates all of them
+whichever it is asked for. Here it is taken apart, also inside of blends, masks and two-sided materials, so that whoever
+wants one lobe gets that lobe whatever the material is: the path tracer, lightmaps, probes, and methods that follow the
+specular lobe alone.
+"""
+
+# mypy: disable-error-code="no-untyped-def, misc"
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from gibench.rendering.layers import Layers
+
+DIFFUSE = int(mi.BSDFFlags.DiffuseReflection)
+NOT_DIFFUSE = int(mi.BSDFFlags.All) & ~DIFFUSE
+"""Masks of the diffuse reflection, and of all lobes that count as specular."""
+
+SMALLEST = 1.2e-38
+"""The smallest normal float32."""
+
+
+def lobes_of(mask: int) -> Any:
+    """A mi.BSDFContext that asks for the lobes of a mask."""
+    return mi.BSDFContext(mi.TransportMode.Radiance, mask)
+
+
+def diffuse_lobe(layers: Layers | None, bsdf: Any, si: Any, wo: Any, active: Any) -> Any:
+    """The diffuse reflection of a material from wo towards si.wi, mi.Color3f, cosine included.
+
+    layers: `Scene.layers`, without which all of `principled` counts as diffuse. bsdf: mi.BSDFPtr. wo: mi.Vector3f, in
+    the frame of si.
+    """
+    value = bsdf.eval(lobes_of(DIFFUSE), si, wo, active)
+    if layers is None or not layers.principled:
+        return value
+    context = lobes_of(DIFFUSE)
+    front = mi.SurfaceInteraction3f(si)
+    front.wi = mi.Vector3f(si.wi.x, si.wi.y, dr.abs(si.wi.z))
+    wo = mi.Vector3f(wo.x, wo.y, dr.mulsign(wo.z, si.wi.z))
+    excess = mi.Spectrum(0)
+    for part in layers.parts(bsdf, si, active)[0]:
+        on = active & (part.weight > 0)
+        on &= part.bsdf.has_attribute("base_color", on)
+        all_lobes = part.bsdf.eval(context, front, wo, on)
+        excess += dr.select(on, part.weight * (all_lobes - _principled_diffuse(part.bsdf, front, wo, on)), 0)
+    return dr.clip(value - excess, 0, value)
+
+
+def split(bsdf: Any, value: Any, diffuse: Any) -> tuple[Any, Any]:
+    """A BSDF's value as the share of its diffuse reflection and that of everything else, both ≥ 0.
+
+    A difference leaves dust of rounding, so what does not exist is set to 0.
+    """
+    other = dr.select((bsdf.flags() & NOT_DIFFUSE) != 0, dr.maximum(value - diffuse, 0), 0)
+    return diffuse, other
+
+
+def sample_specular(
+    layers: Layers, bsdf: Any, si: Any, sample1: Any, sample2: Any, active: Any
+) -> tuple[Any, Any]:
+    """A mi.BSDFSample3f of the specular lobes, and value over density of those lobes alone, mi.Color3f.
+
+    sample1, sample2: mi.Float and mi.Point2f in [0, 1). The first chooses among lobes and blended materials.
+    """
+    if not layers.principled:
+        return bsdf.sample(lobes_of(NOT_DIFFUSE), si, sample1, sample2, active)
+    bounce, weight = bsdf.sample(lobes_of(int(mi.BSDFFlags.All)), si, sample1, sample2, active)
+    return bounce, _specular_weight(layers, bsdf, si, bounce, weight, active)
+
+
+def eval_pdf_sample_specular(
+    layers: Layers, bsdf: Any, si: Any, wo: Any, sample1: Any, sample2: Any, active: Any
+) -> tuple[Any, Any, Any, Any]:
+    """`sample_specular` with the value, cosine included, and the density of the lobes for another direction wo.
+
+    Returns value, density, sample, value over density of the sample. The density is that by which the sample is drawn.
+    """
+    if not layers.principled:
+        return bsdf.eval_pdf_sample(lobes_of(NOT_DIFFUSE), si, wo, sample1, sample2, active)
+    value, pdf, bounce, weight = bsdf.eval_pdf_sample(
+        lobes_of(int(mi.BSDFFlags.All)), si, wo, sample1, sample2, active
+    )
+    value = split(bsdf, value, diffuse_lobe(layers, bsdf, si, wo, active))[1]
+    return value, pdf, bounce, _specular_weight(layers, bsdf, si, bounce, weight, active)
+
+
+def _specular_weight(layers, bsdf, si, bounce, weight, active):
+    """What a sample of all lobes weighs for the specular ones."""
+    smooth = active & ~mi.has_flag(bounce.sampled_type, mi.BSDFFlags.Delta) & (bounce.pdf > 0)
+    diffuse = diffuse_lobe(layers, bsdf, si, bounce.wo, smooth)
+    return split(bsdf, weight, dr.select(smooth, diffuse * _inverse(bounce.pdf), 0))[1]
+
+
+def _inverse(x):
+    """1/x for x ≥ 0, where 0 gives something huge yet finite."""
+    return dr.rcp(dr.maximum(x, SMALLEST))
+
+
+def _principled_diffuse(bsdf, si, wo, active):
+    """The diffuse lobe of `principled` alone, cosine included (Burley 2012, section 5.3; flatness: 2015, section 5.2).
+
+    si, wo: turned to the front. Sheen and coats are other lobes.
+    """
+    number = lambda name: bsdf.eval_attribute_1(name, si, active & bsdf.has_attribute(name, active))  # noqa: E731
+    rough = number("roughness")
+    matte = (1 - number("metallic")) * (1 - number("spec_trans")) * (1 - 0.5 * number("diff_trans"))
+    cos_i, cos_o = dr.maximum(si.wi.z, 0), dr.maximum(wo.z, 0)
+    grazing_i, grazing_o = ((1 - c) ** 5 for c in (cos_i, cos_o))
+    half = dr.dot(dr.normalize(si.wi + wo), wo)
+    retro = 2 * rough * dr.square(half)
+    lobe = (1 - 0.5 * grazing_i) * (1 - 0.5 * grazing_o)
+    lobe += retro * (grazing_o + grazing_i + grazing_o * grazing_i * (retro - 1))
+    inner = dr.lerp(1, 0.5 * retro, grazing_o) * dr.lerp(1, 0.5 * retro, grazing_i)
+    flat = 1.25 * (inner * (_inverse(cos_i + cos_o) - 0.5) + 0.5)
+    base = bsdf.eval_attribute("base_color", si, active)
+    value = base * matte * dr.lerp(lobe, flat, number("flatness")) * cos_o * dr.inv_pi
+    return dr.select(active & (cos_i > 0) & (cos_o > 0), value, 0)

@@ -1,0 +1,135 @@
+"""Every method on every kind of material: a floor in uniform light, whose lobes the path tracer tells apart."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from gibench.baselines import (
+    image_space_gathering,
+    light_field_probes,
+    lightmap,
+    nearest_probe,
+    path_traced,
+    rtrt,
+    unstructured_lumigraph,
+)
+from gibench.rendering.camera import PinholeCamera
+from gibench.rendering.scene import Scene, load_dict
+from gibench.stress import meshes
+from gibench.stress.methods import RESOLUTION, frames, prepared
+from gibench.stress.registry import Check, Found, case
+from gibench.stress.scenes import area, coat, mesh, metal, rgb
+from gibench.stress.views import seen
+
+CAMERA = PinholeCamera((0.0, 0.0, 0.5), (0.02, 0.0, -1.0), 0.8)
+"""Sees nothing but the floor, at 0 to 28°."""
+
+PATHS = 1024
+"""A pixel, of the answer."""
+
+
+def _principled(**parameters: Any) -> dict[str, Any]:
+    return {"type": "principled", "base_color": rgb(0.6, 0.4, 0.2), **parameters}
+
+
+MATT = {"type": "diffuse", "reflectance": rgb(0.6, 0.4, 0.2)}
+PLASTIC = coat(0.2, 0.5)
+PRINCIPLED = _principled(roughness=0.55, specular=0.5)
+
+BUMPS = {
+    "type": "bitmap",
+    "data": np.linspace(0, 0.02, 4)[:, None, None] * np.ones((4, 4, 1)),
+    "raw": True,
+    "wrap_mode": "clamp",
+}
+"""A slope of 1 in 50 over each triangle, as a displacement."""
+
+TURNED = {"type": "rgb", "value": [0.55, 0.5, 0.98]}
+"""A normal map that leans by 6°."""
+
+MATERIALS: dict[str, dict[str, Any]] = {
+    "diffuse": MATT,
+    "roughplastic": PLASTIC,
+    "plastic": {"type": "plastic", "diffuse_reflectance": rgb(0.6, 0.4, 0.2)},
+    "roughconductor": metal(0.2),
+    "conductor": {"type": "conductor", "material": "Cu"},
+    "principled": PRINCIPLED,
+    "principled metal": _principled(metallic=0.7, roughness=0.5),
+    "principled coat": _principled(roughness=0.6, clearcoat=1.0, clearcoat_gloss=0.7, sheen=0.3),
+    "two-sided principled": {"type": "twosided", "inside": PRINCIPLED},
+    "two sides": {"type": "twosided", "above": PRINCIPLED, "below": MATT},
+    "blend": {"type": "blendbsdf", "weight": 0.4, "one": MATT, "other": metal(0.2)},
+    "principled blend": {"type": "blendbsdf", "weight": 0.4, "one": PRINCIPLED, "other": PLASTIC},
+    "mask": {"type": "mask", "opacity": 0.7, "inside": PLASTIC},
+    "principled mask": {"type": "mask", "opacity": 0.7, "inside": PRINCIPLED},
+    "bump": {"type": "bumpmap", "texture": BUMPS, "inside": PLASTIC},
+    "principled bump": {"type": "bumpmap", "texture": BUMPS, "inside": PRINCIPLED},
+    "normal map": {
+        "type": "normalmap",
+        "normalmap": {"type": "rgb", "value": [0.55, 0.5, 0.98]},
+        "in": PLASTIC,
+    },
+    "principled normal map": {
+        "type": "normalmap",
+        "normalmap": {"type": "rgb", "value": [0.55, 0.5, 0.98]},
+        "in": PRINCIPLED,
+    },
+}
+"""Stock materials of Mitsuba, and what may lie over them."""
+
+
+def room(floor: dict[str, Any]) -> Scene:
+    """A closed cube of black sides that emit 1, but for the floor: whatever it reflects, it reflects uniform light."""
+    vertices, faces = meshes.cube(np.linspace(-1, 1, 5))
+    sides = faces.reshape(6, -1, 3)
+    rest = np.concatenate([*sides[:4], sides[5]])
+    walls = mesh(vertices, rest, bsdf={"type": "diffuse", "reflectance": rgb(0.0)}, emitter=area(1.0))
+    return load_dict({"type": "scene", "walls": walls, "floor": mesh(vertices, sides[4], bsdf=floor)})
+
+
+EXACT, SPLIT_SUM, FROM_PROBES = 0.01, 0.03, 0.03
+"""Bounds on the mean, of all that the floor reflects: of methods that follow the very lobes; of one that multiplies a
+mirror image with what 64 samples of the lobe weigh; and of those that see the lobe from where their probes stand, or
+by 16 rays."""
+
+METHODS = {
+    path_traced.METHOD: EXACT,
+    lightmap.METHOD: EXACT,
+    rtrt.METHOD: EXACT,
+    image_space_gathering.METHOD: SPLIT_SUM,
+    light_field_probes.METHOD: FROM_PROBES,
+    unstructured_lumigraph.METHOD: FROM_PROBES,
+    nearest_probe.METHOD: FROM_PROBES,
+}
+
+HOLES = "what lies behind a hole is asked of probes in front of it"
+
+
+@case("methods over {covering}", covering=tuple(MATERIALS), quick=("principled", "mask"))
+def floor_of(covering: str) -> Found:
+    """Diffuse and specular light of the floor, each against the path tracer's, by every method."""
+    scene = room(MATERIALS[covering])
+    truth = seen(scene, CAMERA, spp=PATHS, resolution=RESOLUTION).arrays
+    answer = {
+        lobe: float(np.mean(truth[f"direct_{lobe}"] + truth[f"indirect_{lobe}"], dtype=np.float64))
+        for lobe in ("diffuse", "specular")
+    }
+    total = sum(answer.values())
+    with prepared(scene) as site:
+        found = frames(site, CAMERA, tuple(METHODS))
+    for method, bound in METHODS.items():
+        frame = found[method.id]
+        specular = 0.0 if frame.specular is None else float(np.mean(frame.specular, dtype=np.float64))
+        means = {"diffuse": float(np.mean(frame.color, dtype=np.float64)) - specular, "specular": specular}
+        for lobe in ("diffuse",) if frame.specular is None else means:
+            known = HOLES if "mask" in covering and lobe == "specular" and "field" in method.id else ""
+            yield Check(
+                "methods",
+                f"{method.id}: {lobe} light, of all of it",
+                abs(means[lobe] - answer[lobe]) / total,
+                bound,
+                "path tracing with 1024 paths",
+                known,
+            )
