@@ -123,7 +123,8 @@ def floor_of(covering: str) -> Found:
         frame = found[method.id]
         specular = 0.0 if frame.specular is None else float(np.mean(frame.specular, dtype=np.float64))
         means = {"diffuse": float(np.mean(frame.color, dtype=np.float64)) - specular, "specular": specular}
-        for lobe in ("diffuse",) if frame.specular is None else means:
+        # A lightmap has no glossy light, and says so.
+        for lobe in ("diffuse",) if method is lightmap.METHOD else ("diffuse", "specular"):
             known = HOLES if "mask" in covering and lobe == "specular" and "field" in method.id else ""
             yield Check(
                 "methods",

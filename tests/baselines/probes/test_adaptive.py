@@ -241,7 +241,7 @@ def test_lookups_go_there_and_back():
     plain = warp.plain(probe, at)
     apart = np.linalg.norm(columns(warp.moved(probe, plain)) - columns(at), axis=1)
     assert np.mean(apart) < 0.1
-    assert apart.max() < 0.7  # texels, where two cells meet
+    assert apart.max() < 1  # texels, where two cells meet: a neighbour at most
     # Texels are small on the mirror and large off it; all together they cover the map.
     stretch = np.array(warp.stretch(probe, at))
     assert (stretch**2).mean() == pytest.approx(1, rel=0.02)
@@ -327,7 +327,7 @@ def test_coordinates_and_directions_are_inverse(room):
     angle = np.linalg.norm(back - d, axis=1)
     texel = np.pi / 32 * np.array(probes.stretch(mi.UInt32(0), at))
     assert (angle / texel).mean() < 0.05
-    assert (angle / texel).max() < 0.7
+    assert (angle / texel).max() < 1
     assert angle[texel < 0.5 * np.pi / 32].max() < 0.1 * np.pi / 32
     texel = np.array(probes.texel(mi.UInt32(0), vectors(d)))
     np.testing.assert_array_equal(texel, np.array(probes.texel_at(mi.UInt32(0), at)))
