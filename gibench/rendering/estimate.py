@@ -133,27 +133,63 @@ class _Launched:
     invalid: int
 
 
-def _launch(scene: Scene, generator: RayGenerator, block: _Block) -> _Launched:
-    """Traces a block as one kernel."""
+def _launch(scene: Scene, camera: PinholeCamera, resolution: tuple[int, int], block: _Block) -> _Launched:
+    """Traces a block as one kernel, which is recorded for the first one of its size."""
+    import drjit as dr
+    import mitsuba as mi
+
+    from gibench.rendering.replay import camera_arrays, replayed
+    from gibench.rendering.sampling import permutations
+
+    varying = [dr.opaque(mi.UInt32, n) for n in (block.seed, block.first_pixel, block.width)]
+    sizes = (block.pixels, block.samples, block.levels, block.max_depth, block.guides)
+    kernel = replayed(scene, "radiance", _traced, permutations(str(mi.variant())))
+    traced = kernel(camera_arrays(camera, resolution), *varying, *sizes)
+    parts, means, squares, count = traced
+
+    def stacked(components: Any) -> NDArray[np.float32]:
+        return np.stack([np.array(c) for c in components], axis=-1)
+
+    values = stacked(means).astype(np.float64)
+    return _Launched(
+        {name: stacked(value) for name, value in parts.items()},
+        values,
+        stacked(squares).astype(np.float64) * np.square(values),
+        int(count[0]),
+    )
+
+
+def _traced(
+    scene: Scene,
+    camera: dict[str, Any],
+    seed: Any,
+    first: Any,
+    width: Any,
+    pixels: int,
+    samples: int,
+    levels: int,
+    max_depth: int,
+    guides: bool,
+) -> tuple[dict[str, Any], Any, Any, Any]:
+    """What `_Launched` holds of a block, on the device; squares over the squared mean."""
     import drjit as dr
     import mitsuba as mi
 
     from gibench.rendering.integrator import trace_paths
+    from gibench.rendering.replay import ray_generator
     from gibench.rendering.sampling import StratifiedSampler
 
-    lanes = block.pixels * block.samples
-    sampler = StratifiedSampler(block.seed, lanes, block.levels)
-    pixel = dr.arange(mi.UInt32, lanes) // dr.opaque(mi.UInt32, block.samples) + dr.opaque(
-        mi.UInt32, block.first_pixel
-    )
-    row = pixel // dr.opaque(mi.UInt32, block.width)
-    corner = mi.Point2f(mi.Float(pixel - row * dr.opaque(mi.UInt32, block.width)), mi.Float(row))
+    lanes, groups = pixels * samples, samples // 4**levels
+    sampler = StratifiedSampler(seed, lanes, levels)
+    pixel = dr.arange(mi.UInt32, lanes) // dr.opaque(mi.UInt32, samples) + first
+    row = pixel // width
+    corner = mi.Point2f(mi.Float(pixel - row * width), mi.Float(row))
     path = trace_paths(
         scene.mi_scene,
         sampler,
-        generator.rays(corner + sampler.next_2d()),
-        max_depth=block.max_depth,
-        guides=block.guides,
+        ray_generator(camera).rays(corner + sampler.next_2d()),
+        max_depth=max_depth,
+        guides=guides,
         portals=scene.portals,
         layers=scene.layers,
         guide=scene.guide,
@@ -161,42 +197,34 @@ def _launch(scene: Scene, generator: RayGenerator, block: _Block) -> _Launched:
 
     parts = {name: getattr(path, name) for name in PARTS}
     finite = dr.all(dr.isfinite(sum(parts.values())))
-    if block.guides:
+    if guides:
         finite &= dr.all(dr.isfinite(path.albedo + path.normal))
     # Divided before they are summed, so that huge radiance does not overflow on the way.
-    share = 1 / dr.opaque(mi.Float, block.samples)
+    share = 1 / dr.opaque(mi.Float, samples)
     parts = {name: dr.select(finite, value * share, 0) for name, value in parts.items()}
-    if block.guides:
+    if guides:
         parts |= {name: dr.select(finite, getattr(path, name) * share, 0) for name in GUIDES}
     invalid = dr.select(finite, mi.UInt32(0), mi.UInt32(1))
     # One kernel for all of it. A reduction of what is not evaluated yet would trace the paths once more.
     dr.eval(parts, invalid)
 
-    sums = {name: [dr.block_sum(c, block.samples) for c in value] for name, value in parts.items()}
+    sums = {name: [dr.block_sum(c, samples) for c in value] for name, value in parts.items()}
     means, squares = [], []
     for component in sum(parts[name] for name in PARTS):
-        group = dr.block_sum(component, 4**block.levels) * block.groups
-        mean = dr.block_sum(group / block.groups, block.groups)
+        group = dr.block_sum(component, 4**levels) * groups
+        mean = dr.block_sum(group / groups, groups)
         # As multiples of the mean, which are at most the number of groups: squares of huge radiance overflow.
-        multiple = dr.select(group > 0, group / dr.repeat(mean, block.groups), 0)
+        multiple = dr.select(group > 0, group / dr.repeat(mean, groups), 0)
         means.append(mean)
-        squares.append(dr.block_sum(dr.square(multiple - 1), block.groups))
+        squares.append(dr.block_sum(dr.square(multiple - 1), groups))
     count = dr.sum(invalid)
     dr.eval(sums, means, squares, count)
-
-    def stacked(components: list[Any]) -> NDArray[np.float32]:
-        return np.stack([np.array(c) for c in components], axis=-1)
-
-    values = stacked(means).astype(np.float64)
-    return _Launched(
-        {name: stacked(value) for name, value in sums.items()},
-        values,
-        stacked(squares).astype(np.float64) * np.square(values),
-        int(count[0]),
-    )
+    return sums, means, squares, count
 
 
-def _launch_scalar(scene: Scene, generator: RayGenerator, block: _Block) -> _Launched:
+def _launch_scalar(
+    scene: Scene, camera: PinholeCamera, resolution: tuple[int, int], block: _Block
+) -> _Launched:
     """The same one path at a time, for machines on which Dr.Jit compiles nothing."""
     import mitsuba as mi
 
@@ -204,6 +232,7 @@ def _launch_scalar(scene: Scene, generator: RayGenerator, block: _Block) -> _Lau
     from gibench.rendering.sampling import IndependentSampler
 
     sampler = IndependentSampler()
+    generator = RayGenerator(camera, resolution)
     names = [*PARTS, *(GUIDES if block.guides else ())]
     values = np.zeros((len(names), block.pixels, block.samples, 3), dtype=np.float32)
     for p in range(block.pixels):
@@ -244,7 +273,6 @@ def _add(
     """Adds `samples` paths to every pixel: a block of pixels after the other, so that LANES bounds the memory."""
 
     launch = _launch_scalar if is_scalar() else _launch
-    generator = RayGenerator(camera, resolution)
     pixels = max(LANES // samples, 1)
     added = samples // 4**estimate.levels
     total = estimate.groups + added
@@ -257,7 +285,7 @@ def _add(
         start = time.perf_counter()
         block = _Block(resolution[0], first, count, samples, estimate.levels, number, max_depth, guides)
         with tracing():
-            launched = launch(scene, generator, block)
+            launched = launch(scene, camera, resolution, block)
         estimate.seconds += time.perf_counter() - start
         estimate.invalid += launched.invalid
         for name, value in launched.parts.items():

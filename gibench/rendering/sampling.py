@@ -14,6 +14,7 @@ whatever the group's size. Later dimensions, in the loop, come from the independ
 from __future__ import annotations
 
 import itertools
+from functools import cache
 from typing import Any
 
 import drjit as dr
@@ -27,6 +28,14 @@ _PERMUTATIONS = np.array(
 """The 24 permutations of {0, 1, 2, 3}, two bits an image, eight bits each."""
 
 
+@cache
+def permutations(variant: str) -> Any:
+    """The same on the device, mi.UInt32. variant: the current one."""
+    table = mi.UInt32(_PERMUTATIONS)
+    dr.make_opaque(table)
+    return table
+
+
 class StratifiedSampler:
     """Draws for lanes that are ordered in consecutive groups of 4^levels samples of one pixel.
 
@@ -34,17 +43,17 @@ class StratifiedSampler:
     happens inside loops. seed: decides all numbers. With levels = 0 every draw is independent.
     """
 
-    def __init__(self, seed: int, lanes: int, levels: int) -> None:
-        """Under a vectorised variant."""
+    def __init__(self, seed: Any, lanes: int, levels: int) -> None:
+        """Under a vectorised variant. seed: an integer, or mi.UInt32 that is kept out of the kernel."""
         self.independent: Any = mi.load_dict({"type": "independent"})
-        opaque_seed = dr.opaque(mi.UInt32, seed)
+        opaque_seed = seed if isinstance(seed, mi.UInt32) else dr.opaque(mi.UInt32, seed)
         self.independent.seed(opaque_seed, lanes)
         self._levels = levels
         lane = dr.arange(mi.UInt32, lanes)
         self._sample = lane & ((1 << (2 * levels)) - 1)
         self._key = mi.sample_tea_32(opaque_seed, lane >> (2 * levels))[0]
         self._dimension = 0
-        self._table = mi.UInt32(_PERMUTATIONS)
+        self._table = permutations(str(mi.variant()))
 
     def _stratum(self) -> Any:
         """Which stratum this lane gets in the next dimension: a permutation of its place in the group.

@@ -53,7 +53,13 @@ class Scene:
     _beside: tuple[Any, ...] = ()  # what must live as long as the scene
 
     @cached_property
-    def _tables(self) -> tuple[Any, Any]:
+    def replays(self) -> dict[Any, Any]:
+        """Kernels that were recorded for this scene, by name; see `replay.replayed`."""
+        return {}
+
+    @cached_property
+    def tables(self) -> tuple[Any, Any]:
+        """Ids of materials and of shapes, by what identifies them inside a kernel; mi.UInt32 each."""
         import drjit as dr
         import mitsuba as mi
 
@@ -110,7 +116,7 @@ class Scene:
 
         if is_scalar():
             return self._material_of.get(id(bsdf), 0) if active else 0
-        return dr.gather(mi.UInt32, self._tables[0], dr.reinterpret_array(mi.UInt32, bsdf), active)
+        return dr.gather(mi.UInt32, self.tables[0], dr.reinterpret_array(mi.UInt32, bsdf), active)
 
     def shape_ids(self, shape: Any, active: Any) -> Any:
         """Ids (from 1) of an array of shape pointers; 0 where not `active`."""
@@ -119,7 +125,7 @@ class Scene:
 
         if is_scalar():
             return self._shape_of.get(id(shape), 0) if active else 0
-        return dr.gather(mi.UInt32, self._tables[1], dr.reinterpret_array(mi.UInt32, shape), active)
+        return dr.gather(mi.UInt32, self.tables[1], dr.reinterpret_array(mi.UInt32, shape), active)
 
 
 def _check(shape: Any) -> None:
