@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gibench.generators.materials.color import lch
 from gibench.metrics import reference_exposure, tone_map
-from gibench.rendering.channels import Channel
+from gibench.rendering.channels import CUES, Channel
 
 Picture = NDArray[np.float32]
 
@@ -24,7 +24,7 @@ def picture_of(channel: Channel, values: NDArray[Any], exposure: float) -> tuple
     if channel.name == "color_se":
         own = float(reference_exposure(values))
         return tone_map(values, own), f"exposure x{own / exposure:.0f}"
-    if channel.set == "radiance":
+    if channel.set == "radiance" or channel.name in CUES:
         return tone_map(values, exposure), ""
     if channel.dtype == "uint":
         ids = values[..., 0]

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from gibench.datasets.errors import StorageError, UnknownChannel, nearest
 from gibench.datasets.exr_header import HeaderError, read_header
 from gibench.gate import GateError
-from gibench.rendering.channels import CHANNELS, PARTS, Channel
+from gibench.rendering.channels import CHANNELS, CUES, PARTS, Channel
 
 #: Largest relative error that storing a value as half may bring, on any pixel.
 HALF_TOLERANCE = 1e-3
@@ -109,7 +109,7 @@ def stored_types(arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
 
 def is_radiance(channel: Channel) -> bool:
     """Whether the channel holds light, which is never negative."""
-    return channel.set == "radiance"
+    return channel.set == "radiance" or channel.name in CUES
 
 
 def _refuse_impossible(channel: Channel, values: NDArray[Any]) -> None:

@@ -38,6 +38,8 @@ class Channel:
 
 _RADIANCE = "W/(m^2 sr)"
 
+_CUE = "direct light where every material that is not diffuse is"
+
 PARTS = ("emission", "direct_diffuse", "direct_specular", "indirect_diffuse", "indirect_specular")
 """The five radiance channels whose sum is `color`, in the order in which they are added."""
 
@@ -86,8 +88,18 @@ CHANNELS: dict[str, Channel] = {
         Channel("curvature_direction", 3, "float", "1", "direction of the first, world space", "curvature"),
         Channel("motion", 2, "float", "px", "from here to the same point in the frame before it", "motion"),
         Channel("motion_valid", 1, "half", "1", "1 where the point is seen in the frame before it", "motion"),
+        Channel(
+            "light_direction", 3, "float", "1", "towards the centre of the area light, 0 without", "lighting"
+        ),
+        Channel("radiance_cue_0", 3, "half", _RADIANCE, f"{_CUE} a white Lambertian one", "lighting"),
+        Channel("radiance_cue_1", 3, "half", _RADIANCE, f"{_CUE} a white one of GGX alpha 0.05", "lighting"),
+        Channel("radiance_cue_2", 3, "half", _RADIANCE, f"{_CUE} a white one of GGX alpha 0.13", "lighting"),
+        Channel("radiance_cue_3", 3, "half", _RADIANCE, f"{_CUE} a white one of GGX alpha 0.34", "lighting"),
     )
 }
+
+CUES = ("radiance_cue_0", "radiance_cue_1", "radiance_cue_2", "radiance_cue_3")
+"""Channels that are sampled like radiance, but for materials that stand in for the scene's (Gao et al. 2022)."""
 
 SETS: dict[str, tuple[str, ...]] = {
     s: tuple(c.name for c in CHANNELS.values() if c.set == s)

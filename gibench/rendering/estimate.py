@@ -39,6 +39,9 @@ RELATIVE_FLOOR = 0.01
 
 GUIDES = ("albedo", "normal")
 
+CUES_LANE = 1 << 20
+"""Of the random numbers of radiance cues; those of radiance are counted by samples, of which there are fewer."""
+
 
 class EstimateError(GibenchError, ValueError):
     """A number of samples, a depth or an error target that cannot be rendered."""
@@ -347,3 +350,41 @@ def frame_of(values: NDArray[Any], resolution: tuple[int, int]) -> NDArray[np.fl
     """(H·W, C) as a float32 image (H, W, C)."""
     width, height = resolution
     return values.reshape(height, width, -1).astype(np.float32)
+
+
+def estimate_cues(
+    scene: Scene, camera: PinholeCamera, resolution: tuple[int, int], *, spp: int, seed: int = 0
+) -> dict[str, NDArray[np.float32]]:
+    """Radiance cues of a frame, and the guides that denoise them: name → (H, W, 3).
+
+    Raises EstimateError for less than one sample a pixel, or under the scalar variant.
+    """
+    if spp < 1:
+        raise EstimateError(f"spp is {spp}: radiance cues need at least 1 sample a pixel")
+    if is_scalar():
+        raise EstimateError(
+            "radiance cues take many rays, for which scalar_rgb is too slow: use another variant"
+        )
+    import drjit as dr
+    import mitsuba as mi
+
+    from gibench.rendering.light_cues import cue_images
+    from gibench.rendering.replay import camera_arrays, replayed
+
+    width, height = resolution
+    at_once = min(spp, ROUND)
+    pixels = max(LANES // at_once, 1)
+    total: dict[str, NDArray[np.float64]] = {}
+    kernel, eye = replayed(scene, "cues", cue_images), camera_arrays(camera, resolution)
+    for done in range(0, spp, at_once):
+        samples = min(at_once, spp - done)
+        for first in range(0, width * height, pixels):
+            count = min(pixels, width * height - first)
+            number = int(
+                np.random.SeedSequence(seed, spawn_key=(CUES_LANE, done, first)).generate_state(1)[0]
+            )
+            varying = [dr.opaque(mi.UInt32, n) for n in (number, first, width)]
+            for name, value in kernel(eye, *varying, count, samples).items():
+                sums = total.setdefault(name, np.zeros((width * height, 3)))
+                sums[first : first + count] += np.array(value).T.astype(np.float64) * (samples / spp)
+    return {name: frame_of(value, resolution) for name, value in total.items()}

@@ -6,7 +6,8 @@ Conventions as in `channels`. A miss holds 0 everywhere. Only what is asked for 
 # mypy: disable-error-code="no-untyped-def, misc"
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
+from functools import partial
 from typing import Any
 
 import drjit as dr
@@ -20,12 +21,14 @@ from gibench.rendering.camera import PinholeCamera, RayGenerator
 from gibench.rendering.channels import CHANNELS, SETS
 from gibench.rendering.curvature import FLAGS
 from gibench.rendering.integrator import bsdf_at, shading_normal
+from gibench.rendering.replay import camera_arrays, ray_generator, replayed
 from gibench.rendering.scene import Scene
 
 VISIBILITY_TOLERANCE = 1e-3
 """Relative difference of distance below which a point counts as the one that the earlier camera saw."""
 
-SURFACE_SETS = ("surface", "reflection", "curvature", "motion")
+SURFACE_SETS = ("surface", "reflection", "curvature", "motion", "lighting")
+"""Sets of channels that are found here; of the last one the direction alone."""
 
 
 def mirror_direction(si: Any, towards: Any) -> Any:
@@ -75,26 +78,98 @@ class Hit:
         return dr.select(self.valid, value, 0)
 
 
-def _motion(
-    hit: Hit, pixel: Any, previous: PinholeCamera | None, resolution: tuple[int, int]
-) -> tuple[Any, Any]:
+def _motion(hit: Hit, pixel: Any, previous: RayGenerator | None) -> tuple[Any, Any]:
     """Offset (pixels) to where the earlier camera saw the point, and whether it did see it there."""
     if previous is None:
         return mi.Vector2f(dr.zeros(mi.Float, dr.width(pixel))), dr.zeros(mi.Float, dr.width(pixel))
-    generator = RayGenerator(previous, resolution)
-    film, depth = generator.project(hit.si.p)
+    film, depth = previous.project(hit.si.p)
     ahead = hit.valid & (depth > 0)
     offset = mi.Vector2f(film - pixel)
     ahead &= dr.all(dr.isfinite(offset))
     offset = dr.select(ahead, offset, 0)
-    inside = ahead & dr.all((film >= 0) & (film < 2 * generator.centre))
-    origin = generator.origin
+    inside = ahead & dr.all((film >= 0) & (film < 2 * previous.centre))
+    origin = previous.origin
     towards = hit.si.p - origin
     distance = dr.norm(towards)
     ray = mi.Ray3f(origin, towards / distance)
     seen = hit.scene.mi_scene.ray_intersect_preliminary(ray, coherent=False, active=inside).t
     visible = inside & (dr.abs(seen - distance) <= VISIBILITY_TOLERANCE * distance)
     return offset, dr.select(visible, mi.Float(1), 0)
+
+
+def _light_direction(hit: Hit) -> Any:
+    """Towards the centre of the area light that lights the scene; 0 on a miss, and where no such light does."""
+    lights = hit.scene.lights
+    if lights is None:
+        return mi.Vector3f(dr.zeros(mi.Float, dr.width(hit.si.p)))
+    towards = lights.centre - hit.si.p
+    length = dr.norm(towards)
+    there = hit.valid & (lights.placed > 0) & (length > 0)
+    return dr.select(there, towards / dr.select(there, length, 1), 0)
+
+
+def _values(
+    scene: Scene, wanted: Collection[str], generator: RayGenerator, previous: RayGenerator | None, pixel: Any
+) -> dict[str, Any]:
+    """Channels at film positions, as `surface_arrays` returns them."""
+    flags = FLAGS if not set(SETS["curvature"]).isdisjoint(wanted) else mi.RayFlags.All
+    hit = Hit(scene, generator.rays(pixel), flags)
+    names: dict[str, Callable[[], Any]] = {
+        "position": lambda: hit.masked(hit.si.p),
+        "normal": lambda: hit.normal,
+        "geometric_normal": lambda: hit.facing(hit.si.n),
+        "depth": lambda: hit.masked(hit.si.t * dr.dot(hit.rays.d, generator.forward)),
+        "distance": lambda: hit.masked(hit.si.t),
+        "albedo": lambda: surface.albedo(scene, hit.bsdf, hit.si, hit.valid),
+        "specular_albedo": lambda: surface.specular_albedo(scene, hit.bsdf, hit.si, hit.valid),
+        "roughness": lambda: surface.roughness(scene, hit.bsdf, hit.si, hit.valid),
+        "material_id": lambda: scene.material_ids(hit.bsdf, hit.valid),
+        "shape_id": lambda: scene.shape_ids(hit.si.shape, hit.valid),
+        "light_direction": lambda: _light_direction(hit),
+    }
+    if not set(SETS["reflection"]).isdisjoint(wanted):
+        mirror = hit.mirrored()
+        names |= {
+            "reflected_position": lambda: mirror.masked(mirror.si.p),
+            "reflected_normal": lambda: mirror.normal,
+            "reflected_albedo": lambda: surface.albedo(scene, mirror.bsdf, mirror.si, mirror.valid),
+            "reflected_distance": lambda: mirror.masked(mirror.si.t),
+            "reflected_material_id": lambda: scene.material_ids(mirror.bsdf, mirror.valid),
+            "reflected_shape_id": lambda: scene.shape_ids(mirror.si.shape, mirror.valid),
+        }
+    if not set(SETS["curvature"]).isdisjoint(wanted):
+        first, second, direction = scene.curvature.principal(hit.si, hit.preliminary)
+        names |= {
+            "curvature": lambda: mi.Vector2f(first, second),
+            "curvature_direction": lambda: direction,
+        }
+    if not set(SETS["motion"]).isdisjoint(wanted):
+        offset, seen = _motion(hit, pixel, previous)
+        names |= {"motion": lambda: offset, "motion_valid": lambda: seen}
+    return {name: names[name]() for name in CHANNELS if name in wanted}
+
+
+def surface_arrays(
+    scene: Scene,
+    wanted: Collection[str],
+    camera: dict[str, Any],
+    width: Any,
+    pixels: int,
+    previous: dict[str, Any] | None = None,
+) -> dict[str, Any]:
+    """The surface-like channels of a frame on the device, evaluated: name → mi.Vector3f, mi.Float, mi.UInt32 …
+
+    wanted: names of channels. camera, previous: `replay.camera_arrays` of this frame and of the one before it on its
+    path. width: mi.UInt32, of the frame. pixels: a lane each, in row order. A function for a `Replay`, which must hold
+    `scene.curvature.arrays` where curvature is wanted. Needs a vectorised variant.
+    """
+    index = dr.arange(mi.UInt32, pixels)
+    row = index // width
+    pixel = mi.Point2f(mi.Float(index - row * width) + 0.5, mi.Float(row) + 0.5)
+    before = ray_generator(previous) if previous else None
+    values = _values(scene, wanted, ray_generator(camera), before, pixel)
+    dr.eval(values)
+    return values
 
 
 def render_gbuffer(
@@ -110,66 +185,33 @@ def render_gbuffer(
     resolution: (width, height). channels: names from the sets in SURFACE_SETS. previous_camera: of the frame before
     it on a path; without one, motion is 0 and nowhere valid. Returns name → (H, W, C), float32 or uint32.
     """
-    wanted = set(channels)
+    wanted = tuple(name for name in CHANNELS if name in channels)
     if not wanted:
         return {}
     width, height = resolution
-    scalar = is_scalar()
-    flags = mi.RayFlags.All
-    if wanted & set(SETS["curvature"]):
-        flags = FLAGS
-    generator = RayGenerator(camera, resolution)
-
-    def values(pixel: Any) -> dict[str, list[Any]]:
-        hit = Hit(scene, generator.rays(pixel), flags)
-        names: dict[str, Callable[[], Any]] = {
-            "position": lambda: hit.masked(hit.si.p),
-            "normal": lambda: hit.normal,
-            "geometric_normal": lambda: hit.facing(hit.si.n),
-            "depth": lambda: hit.masked(hit.si.t * dr.dot(hit.rays.d, generator.forward)),
-            "distance": lambda: hit.masked(hit.si.t),
-            "albedo": lambda: surface.albedo(scene, hit.bsdf, hit.si, hit.valid),
-            "specular_albedo": lambda: surface.specular_albedo(scene, hit.bsdf, hit.si, hit.valid),
-            "roughness": lambda: surface.roughness(scene, hit.bsdf, hit.si, hit.valid),
-            "material_id": lambda: scene.material_ids(hit.bsdf, hit.valid),
-            "shape_id": lambda: scene.shape_ids(hit.si.shape, hit.valid),
-        }
-        if wanted & set(SETS["reflection"]):
-            mirror = hit.mirrored()
-            names |= {
-                "reflected_position": lambda: mirror.masked(mirror.si.p),
-                "reflected_normal": lambda: mirror.normal,
-                "reflected_albedo": lambda: surface.albedo(scene, mirror.bsdf, mirror.si, mirror.valid),
-                "reflected_distance": lambda: mirror.masked(mirror.si.t),
-                "reflected_material_id": lambda: scene.material_ids(mirror.bsdf, mirror.valid),
-                "reflected_shape_id": lambda: scene.shape_ids(mirror.si.shape, mirror.valid),
-            }
-        if wanted & set(SETS["curvature"]):
-            first, second, direction = scene.curvature.principal(hit.si, hit.preliminary)
-            names |= {
-                "curvature": lambda: mi.Vector2f(first, second),
-                "curvature_direction": lambda: direction,
-            }
-        if wanted & set(SETS["motion"]):
-            offset, seen = _motion(hit, pixel, previous_camera, resolution)
-            names |= {"motion": lambda: offset, "motion_valid": lambda: seen}
-        computed = {name: names[name]() for name in wanted}
-        return {name: list(v) if CHANNELS[name].components > 1 else [v] for name, v in computed.items()}
-
-    if scalar:
-        pixels = [values(mi.Point2f(x + 0.5, y + 0.5)) for y in range(height) for x in range(width)]
-        columns = {name: np.array([p[name] for p in pixels]) for name in wanted}
+    if is_scalar():
+        generator = RayGenerator(camera, resolution)
+        before = None if previous_camera is None else RayGenerator(previous_camera, resolution)
+        pixels = [
+            _values(scene, wanted, generator, before, mi.Point2f(x + 0.5, y + 0.5))
+            for y in range(height)
+            for x in range(width)
+        ]
+        columns = {name: np.array([p[name] for p in pixels]).reshape(len(pixels), -1) for name in wanted}
     else:
-        index = dr.arange(mi.UInt32, width * height)
+        held = [] if set(SETS["curvature"]).isdisjoint(wanted) else [scene.curvature.arrays]
+        kernel = replayed(scene, ("surface", wanted), partial(_arrays, wanted), *held)
+        past = {} if previous_camera is None else camera_arrays(previous_camera, resolution)
         across = dr.opaque(mi.UInt32, width)  # one kernel for all sizes
-        row = index // across
-        result = values(mi.Point2f(mi.Float(index - row * across) + 0.5, mi.Float(row) + 0.5))
-        dr.eval(result)
-        columns = {name: np.stack([np.array(c) for c in parts], axis=-1) for name, parts in result.items()}
+        found = kernel(camera_arrays(camera, resolution), across, width * height, past)
+        columns = {name: np.array(value).reshape(-1, width * height).T for name, value in found.items()}
     return {
-        name: columns[name]
+        name: np.ascontiguousarray(columns[name])
         .reshape(height, width, CHANNELS[name].components)
         .astype(np.uint32 if CHANNELS[name].dtype == "uint" else np.float32)
-        for name in CHANNELS
-        if name in wanted
+        for name in wanted
     }
+
+
+def _arrays(wanted: tuple[str, ...], scene: Scene, *arguments: Any) -> dict[str, Any]:
+    return surface_arrays(scene, wanted, *arguments)

@@ -16,7 +16,7 @@ from gibench.rendering.backend import is_scalar
 from gibench.rendering.latlong import for_envmap
 from gibench.rendering.lighting import AreaLight, Lighting, LightingError
 from gibench.rendering.panoramas import HEIGHT
-from gibench.rendering.scene import Scene, wrap
+from gibench.rendering.scene import Scene, make_tables, wrap
 
 AREA_LIGHT, AREA_LIGHT_MATERIAL, ENVIRONMENT = "area_light", "area_light_material", "environment"
 """Names of what a rig adds to a scene."""
@@ -149,6 +149,7 @@ class LightRig:
             sky = self._set_sky(lighting)
         self._switch(lighting.kind == "own", lighting.area is not None, sky)
         self._parameters.update()
+        make_tables(self.scene.mi_scene)
         self.scene.lights.show(lighting)
         if self.scene.portals is not None:
             by_own = self._own_sky is None and lighting.kind == "own"

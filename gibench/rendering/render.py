@@ -11,9 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gibench.rendering.camera import PinholeCamera, check_resolution
-from gibench.rendering.channels import PARTS, SETS, resolve
+from gibench.rendering.channels import CUES, PARTS, SETS, resolve
 from gibench.rendering.denoise import denoise_part, mean_change
-from gibench.rendering.estimate import Estimate, estimate_radiance, frame_of
+from gibench.rendering.estimate import (
+    GUIDES,
+    Estimate,
+    EstimateError,
+    estimate_cues,
+    estimate_radiance,
+    frame_of,
+)
 from gibench.rendering.scene import Scene
 
 MAX_DEPTH = 8
@@ -82,8 +89,8 @@ def render_frame(
     scene: from `load_scene`. resolution: (width, height). channels: names of channels or sets; what is not named is
     not computed. spp or error: samples a pixel, or the median relative standard error to reach with at most spp_cap
     samples. seed: decides every pixel, together with the variant and the versions. denoise: removes the noise of each
-    radiance part on its own; color stays their sum, and color_se stays that of the samples. previous_camera: for the
-    motion channels.
+    radiance part and cue on its own; color stays their sum, and color_se stays that of the samples. previous_camera:
+    for the motion channels.
 
     Raises UnknownChannelError, CameraError, EstimateError or DenoiserError.
     """
@@ -91,7 +98,8 @@ def render_frame(
     width, height = check_resolution(resolution)
     names = resolve(channels)
     radiance = [n for n in names if n in SETS["radiance"]]
-    rest = [n for n in names if n not in SETS["radiance"]]
+    cues = [n for n in names if n in CUES]
+    rest = [n for n in names if n not in SETS["radiance"] and n not in CUES]
     arrays: dict[str, NDArray[Any]] = {}
     estimate = Estimate(0, 0)
     denoise_seconds = denoise_change = 0.0
@@ -112,6 +120,18 @@ def render_frame(
         arrays |= denoised
         denoise_seconds = time.perf_counter() - before if denoise else 0.0
     kernel_seconds = estimate.seconds
+    if cues:
+        if not (estimate.spp or spp):
+            raise EstimateError(
+                "radiance cues need spp where no radiance is asked for: give it in place of error"
+            )
+        before = time.perf_counter()
+        sampled = estimate_cues(scene, camera, (width, height), spp=estimate.spp or spp or 0, seed=seed)
+        kernel_seconds += time.perf_counter() - before
+        before = time.perf_counter()
+        guides = {name: sampled[name] for name in GUIDES}
+        arrays |= {n: denoise_part(sampled[n], **guides) if denoise else sampled[n] for n in cues}
+        denoise_seconds += time.perf_counter() - before if denoise else 0.0
     if rest:
         from gibench.rendering.gbuffer import render_gbuffer
 

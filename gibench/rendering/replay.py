@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Callable
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import drjit as dr
@@ -22,8 +22,9 @@ from gibench.rendering.camera import PinholeCamera, RayGenerator
 from gibench.rendering.scene import Scene
 
 
-def _kinds() -> list[Any]:
-    """A pointer to a plugin of every kind that kernels call.
+@cache
+def _kinds(variant: str) -> list[Any]:
+    """A pointer to a plugin of every kind that kernels call, the same for all replays. variant: the current one.
 
     A call of a BSDF, a shape or a light reaches all that are alive in the process, those of other scenes too. Dr.Jit
     looks for them where a pointer of that kind is among the inputs.
@@ -46,7 +47,8 @@ class Replay:
         held: arrays, or pytrees of them, that it reads besides and that stay as they are.
         """
         guide = [] if scene.guide is None else scene.guide.arrays
-        self._held = [scene.mi_scene, scene.tables, scene.layers.arrays, guide, _kinds(), held]
+        kinds = _kinds(str(mi.variant()))
+        self._held = [scene.mi_scene, scene.tables, scene.layers.arrays, guide, kinds, held]
         # Their arrays are others after a change of the light.
         self._changing = [thing for thing in (scene.portals, scene.lights) if thing is not None]
         self._function = function

@@ -140,6 +140,23 @@ def _check(shape: Any) -> None:
             )
 
 
+def make_tables(mi_scene: Any) -> None:
+    """Let lights with a texture make the tables by which they are sampled.
+
+    They do so when they are first sampled. Where that is in the middle of a recording (`replay`), be it of another
+    scene, whose calls reach all lights that are alive, the tables would be no input of it.
+    """
+    if is_scalar():
+        return
+    import drjit as dr
+    import mitsuba as mi
+
+    nowhere = dr.zeros(mi.Interaction3f, 1)
+    for emitter in mi_scene.emitters():
+        if mi.has_flag(emitter.flags(), mi.EmitterFlags.SpatiallyVarying) and not emitter.is_environment():
+            dr.eval(emitter.sample_direction(nowhere, mi.Point2f(0.5))[1])
+
+
 def wrap(mi_scene: Any, *, last: str = "") -> Scene:
     """The handle of a `mitsuba.Scene` that already exists, made under the current variant.
 
@@ -163,6 +180,7 @@ def wrap(mi_scene: Any, *, last: str = "") -> Scene:
         if key not in material_of:
             materials.append(bsdf.id() or f"material_{len(materials)}")
             material_of[key] = len(materials)
+    make_tables(mi_scene)
     return Scene(mi_scene, tuple(materials), tuple(shapes), material_of, shape_of)
 
 
