@@ -16,16 +16,8 @@ import drjit as dr
 import mitsuba as mi
 
 from gibench.rendering.channels import CUES
-from gibench.rendering.integrator import (
-    NOT_DIFFUSE,
-    _emission,
-    _emission_weight,
-    _inverse,
-    _sample_light,
-    bsdf_at,
-    mis_weight,
-    shading_normal,
-)
+from gibench.rendering.integrator import NOT_DIFFUSE, bsdf_at, shading_normal
+from gibench.rendering.light_sampling import emission, emission_weight, inverse, mis_weight, sample_light
 from gibench.rendering.replay import ray_generator
 from gibench.rendering.sampling import IndependentSampler
 from gibench.rendering.scene import Scene
@@ -50,7 +42,7 @@ class _Bases:
         half = dr.normalize(self.wi + wo)
         values = [wo.z * dr.inv_pi]
         for lobe in self.lobes:
-            values.append(lobe.eval(half) * lobe.G(self.wi, wo, half) * 0.25 * _inverse(self.wi.z))
+            values.append(lobe.eval(half) * lobe.G(self.wi, wo, half) * 0.25 * inverse(self.wi.z))
         return [dr.select(above, value, 0) for value in values]
 
     def density(self, wo: Any) -> Any:
@@ -59,7 +51,7 @@ class _Bases:
         half = dr.normalize(self.wi + wo)
         total = wo.z * dr.inv_pi
         for lobe in self.lobes:
-            total += lobe.pdf(self.wi, half) * 0.25 * _inverse(dr.dot(wo, half))
+            total += lobe.pdf(self.wi, half) * 0.25 * inverse(dr.dot(wo, half))
         return dr.select(above, total / (1 + len(self.lobes)), 0)
 
     def sample(self, choice: Any, u: Any) -> Any:
@@ -96,11 +88,12 @@ def light_cues(scene: Scene, sampler: Any, rays: Any) -> dict[str, Any]:
         turned = mi.Vector3f(towards.x, towards.y, towards.z * side)
         return dr.select(own, dr.maximum(turned.z, 0) * dr.inv_pi, bases.density(turned))
 
-    direction, light_pdf, only_so, light = _sample_light(mi_scene, portals, si, sampler.next_2d(), active)
-    to_light = si.to_local(direction)
-    share = dr.select(only_so, 1, mis_weight(light_pdf, density(to_light)))
-    lit = active & (light_pdf != 0)
-    sums = [dr.select(lit, value * light * share, 0) for value in values(to_light, lit)]
+    # A guide learns where light comes from for the scene's own materials; these are others.
+    light = sample_light(mi_scene, portals, None, si, mi.UInt32(0), sampler, active)
+    to_light = si.to_local(light.direction)
+    share = dr.select(light.delta, 1, mis_weight(light.pdf, density(to_light)))
+    lit = active & (light.pdf != 0)
+    sums = [dr.select(lit, value * light.weight * share, 0) for value in values(to_light, lit)]
 
     choice, u = sampler.next_1d(), sampler.next_2d()
     bounce = dr.select(own, mi.warp.square_to_cosine_hemisphere(u), bases.sample(choice, u))
@@ -108,8 +101,9 @@ def light_cues(scene: Scene, sampler: Any, rays: Any) -> dict[str, Any]:
     pdf = density(bounce)
     onward = active & (pdf > 0)
     met = mi_scene.ray_intersect(si.spawn_ray(si.to_world(bounce)), mi.RayFlags.All, False, onward)
-    weight = _emission_weight(mi_scene, portals, met, mi.Interaction3f(si), pdf, mi.Bool(False), onward)
-    seen = _emission(mi_scene, met, onward) * weight * _inverse(pdf)
+    reference, row = mi.Interaction3f(si), mi.UInt32(0)
+    weight = emission_weight(mi_scene, portals, None, met, reference, row, pdf, mi.Bool(False), onward)
+    seen = emission(mi_scene, met, onward) * weight * inverse(pdf)
     for number, value in enumerate(values(bounce, onward)):
         sums[number] += dr.select(onward, value * seen, 0)
 
