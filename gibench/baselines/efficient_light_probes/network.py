@@ -15,7 +15,9 @@ from itertools import pairwise
 
 import torch
 from torch import Tensor, nn
-from torch.nn.functional import leaky_relu, pad
+from torch.nn.functional import leaky_relu
+
+from gibench.baselines.training.padding import padded
 
 CHANNELS = (16, 24, 32, 48)
 """Of the levels, from full resolution down; each next one has half the width and height."""
@@ -124,10 +126,7 @@ class ReconstructionNetwork(nn.Module):
         """Compressed radiance (N, 3, H, W) and guides (N, GUIDES, H, W) of any size to compressed radiance."""
         height, width = image.shape[-2:]
         multiple = 2 ** len(self.up)
-        margins = (0, -width % multiple, 0, -height % multiple)
-        features, conditions = image, guides
-        if any(margins):
-            features, conditions = (pad(part, margins, mode="replicate") for part in (image, guides))
+        features, conditions = padded(image, multiple), padded(guides, multiple)
         skips = []
         for down, condition, fuse in zip(self.image, self.guides, self.fusions, strict=True):
             features, conditions = (

@@ -1,0 +1,105 @@
+"""The network of Neural Global Illumination (Gao et al. 2022, section 3.3).
+
+A U-Net looks at the whole screen, a perceptron at each pixel: at what the U-Net found there, at the pixel's inputs, and
+at those encoded by sines and cosines. What it says is the code of indirect radiance (`LogCode`). The paper gives its
+depth, width and size; the U-Net is that of pix2pix with half of the channels, which comes out at that size.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor, nn
+from torch.nn.functional import relu
+
+from gibench.baselines.pix2pix.network import UNet
+from gibench.baselines.training.encodings.positional import positional
+
+INPUTS = {
+    "position": 3,
+    "normal": 3,
+    "diffuse": 3,
+    "specular": 3,
+    "roughness": 1,
+    "view": 3,
+    "direct": 3,
+    "cues": 12,
+    "light_direction": 3,
+}
+"""Channels of a pixel, in this order: 34 (section 3.2)."""
+
+JOINED = 4
+"""Layer of the perceptron that is given its input again."""
+
+
+@dataclass(frozen=True)
+class Size:
+    """How large the network is.
+
+    levels: channels of the U-Net, a halving each; none for no U-Net. found: channels that it gives the perceptron.
+    width, depth: of the perceptron's hidden layers. frequencies: of the encoding, 0 for none. encoded: names of the
+    inputs that are encoded.
+    """
+
+    levels: tuple[int, ...]
+    found: int
+    width: int
+    depth: int
+    frequencies: int
+    encoded: tuple[str, ...] = tuple(INPUTS)
+
+
+FULL = Size((32, 64, 128, 256, 256, 256, 256, 256), 128, 256, 8, 10)
+"""Of the paper: 14.65 M parameters, 55.9 MB of 2²⁰ bytes (section 4.1)."""
+
+SMALL = Size((16, 32, 64, 128, 128), 32, 128, 6, 5, ("position", "normal", "view", "light_direction"))
+"""For processors without a GPU. Directions and positions alone are encoded: of light, high frequencies mean nothing."""
+
+
+class NeuralGlobalIllumination(nn.Module):
+    """See the module."""
+
+    encoded: Tensor
+
+    def __init__(self, size: Size = FULL, inputs: int = sum(INPUTS.values())) -> None:
+        """inputs: channels of a pixel, fewer where some of INPUTS at their end are left out."""
+        super().__init__()
+        self.size = size
+        self.register_buffer("encoded", _channels_of(size.encoded, inputs), persistent=False)
+        # Fitting one room is a regression, in which nothing is dropped.
+        self.screen = UNet(inputs, size.found, size.levels, dropped=0) if size.levels else None
+        given = inputs + 2 * size.frequencies * len(self.encoded) + (size.found if size.levels else 0)
+        widths = [given, *(size.width for _ in range(size.depth - 1))]
+        self.hidden = nn.ModuleList(
+            nn.Conv2d(before + (given if layer == JOINED else 0), size.width, 1)
+            for layer, before in enumerate(widths)
+        )
+        self.last = nn.Conv2d(size.width, 3, 1)
+        for layer in self.hidden:
+            nn.init.kaiming_uniform_(layer.weight, nonlinearity="relu")  # type: ignore[arg-type]
+            nn.init.zeros_(layer.bias)  # type: ignore[arg-type]
+
+    def forward(self, pixels: Tensor) -> Tensor:
+        """(N, inputs, H, W) of any size, HDR among it compressed, to the code of radiance (N, 3, H, W)."""
+        parts = [pixels]
+        if self.size.frequencies and len(self.encoded):
+            parts.append(positional(pixels[:, self.encoded], self.size.frequencies, dim=1))
+        if self.screen is not None:
+            parts.append(self.screen(pixels))
+        given = features = torch.cat(parts, dim=1)
+        for layer, hidden in enumerate(self.hidden):
+            if layer == JOINED:
+                features = torch.cat([features, given], dim=1)
+            features = relu(hidden(features))
+        code: Tensor = self.last(features)
+        return code
+
+
+def _channels_of(names: tuple[str, ...], inputs: int) -> Tensor:
+    found, at = [], 0
+    for name, count in INPUTS.items():
+        if name in names:
+            found += [channel for channel in range(at, at + count) if channel < inputs]
+        at += count
+    return torch.tensor(found, dtype=torch.long)
