@@ -36,5 +36,9 @@ def seeded(seed: int) -> Iterator[None]:
 def random_of_step(seed: int, number: int) -> np.random.Generator:
     """The random numbers of a step; torch's own are seeded from the same."""
     sequence = np.random.SeedSequence(seed, spawn_key=(LANE, number))
-    torch.manual_seed(int(sequence.generate_state(1, np.uint64)[0]))
+    drawn = int(sequence.generate_state(1, np.uint64)[0])
+    # `torch.manual_seed` keeps a traceback for every kind of device that is not there: 5 ms a step, and never freed.
+    torch.default_generator.manual_seed(drawn)
+    if torch.cuda.is_initialized():
+        torch.cuda.manual_seed_all(drawn)
     return np.random.default_rng(sequence)

@@ -7,7 +7,6 @@ from itertools import product
 
 import torch
 from torch import Tensor, nn
-from torch.nn.functional import embedding
 
 from gibench.baselines.training.errors import TrainingError
 
@@ -65,8 +64,8 @@ class HashGrid(nn.Module):
             )
             indices.append(torch.stack(index, dim=-1) + offset)
             weights.append(torch.stack(weight, dim=-1))
-        # One gather for all levels; its gradient adds in an order that does not change.
-        values = embedding(torch.stack(indices, dim=1), self.entries)
+        # One gather for all levels; where torch is to be deterministic its gradient adds in an order of its own.
+        values = self.entries[torch.stack(indices, dim=1)]
         mixed = (torch.stack(weights, dim=1)[..., None] * values).sum(dim=2)
         return mixed.reshape(*points.shape[:-1], self.channels)
 

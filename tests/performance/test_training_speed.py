@@ -1,0 +1,104 @@
+"""What the shared loop adds to a step, whether bfloat16 pays, and how a hash grid is read."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import pytest
+import torch
+
+from gibench.baselines.efficient_light_probes.network import GUIDES, ReconstructionNetwork
+from gibench.baselines.geometry_aware_feature_aggregation.network import MINI, GeometryAware
+from gibench.baselines.neural_global_illumination.network import SMALL, NeuralGlobalIllumination
+from gibench.baselines.training.budget import Budget
+from gibench.baselines.training.loop import train
+from gibench.baselines.training.reproducible import deterministic
+from tests.baselines.training.toys import Fit, points
+from tests.performance.turns import seconds
+
+pytestmark = pytest.mark.performance
+
+
+def test_what_the_loop_adds_to_a_step():
+    """Beside the same steps without looks, seeds, clocks and checkpoints. The network is a toy: it is all overhead."""
+    steps = 200
+    ready = [batch for batch, _ in zip(points()(0), range(steps), strict=False)]
+
+    def bare():
+        network = Fit().networks["fit"]
+        optimiser = torch.optim.Adam(network.parameters())
+        for x, y in ready:
+            optimiser.zero_grad(set_to_none=True)
+            loss = (network(x) - y).square().mean()
+            loss.backward()
+            torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
+            optimiser.step()
+
+    def ours():
+        train(Fit(), lambda first: iter(ready[first:]), Budget(steps=steps, look_every=steps), seed=0)
+
+    plain, looped = seconds(bare, ours, repeats=5)
+    print(
+        f"\nthe loop adds {1e3 * (looped - plain) / steps:.2f} ms to a step of {1e3 * plain / steps:.2f} ms"
+    )
+    assert looped > 0
+
+
+NETWORKS = {
+    "ngi, small, 128²": lambda: (NeuralGlobalIllumination(SMALL), (torch.randn(1, 34, 128, 128),)),
+    "gfa:mini, 96 × 64": lambda: (
+        GeometryAware(MINI),
+        (torch.rand(1, 2, 3, 64, 96), torch.randn(1, 7, 64, 96)),
+    ),
+    "elp, 4 crops of 64²": lambda: (
+        ReconstructionNetwork(),
+        (torch.rand(4, 3, 64, 64), torch.rand(4, GUIDES, 64, 64)),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", NETWORKS)
+def test_whether_bfloat16_pays(name):
+    torch.manual_seed(0)
+    network, given = NETWORKS[name]()
+    optimiser = torch.optim.Adam(network.parameters(), 1e-4)
+
+    def step(low):
+        with torch.autocast("cpu", torch.bfloat16, enabled=low):
+            output = network(*given)
+        loss = (output.float() - 0.3).abs().mean()
+        optimiser.zero_grad()
+        loss.backward()
+        optimiser.step()
+
+    single, half = seconds(partial(step, False), partial(step, True), repeats=5)
+    network.eval()
+    with torch.no_grad():
+        exact = network(*given)
+        with torch.autocast("cpu", torch.bfloat16):
+            rough = network(*given).float()
+    off = float((rough - exact).abs().mean() / exact.abs().mean())
+    print(
+        f"\n{name}: a step in bfloat16 takes {half / single:.2f} of single precision, {100 * off:.1f} % off"
+    )
+    assert off < 0.05
+
+
+def test_how_the_entries_of_a_hash_grid_are_gathered():
+    """By an index, or by torch's embedding, both with gradients that repeat their bits."""
+    torch.manual_seed(0)
+    entries = torch.nn.Parameter(torch.randn(8 * 2**15, 2))
+    index = torch.randint(len(entries), (8192, 8, 8))
+
+    def learned(gathered):
+        entries.grad = None
+        with deterministic():
+            gathered().square().sum().backward()
+
+    ours, other = seconds(
+        partial(learned, lambda: entries[index]),
+        partial(learned, lambda: torch.nn.functional.embedding(index, entries)),
+        repeats=5,
+    )
+    print(f"\nforward and backward by embedding take {other / ours:.2f} times as long as by an index")
+    assert ours > 0
