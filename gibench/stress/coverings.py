@@ -38,13 +38,8 @@ MATT = {"type": "diffuse", "reflectance": rgb(0.6, 0.4, 0.2)}
 PLASTIC = coat(0.2, 0.5)
 PRINCIPLED = _principled(roughness=0.55, specular=0.5)
 
-BUMPS = {
-    "type": "bitmap",
-    "data": np.linspace(0, 0.02, 4)[:, None, None] * np.ones((4, 4, 1)),
-    "raw": True,
-    "wrap_mode": "clamp",
-}
-"""A slope of 1 in 50 over each triangle, as a displacement."""
+BUMPS = {"type": "bumps"}
+"""Stands for a slope of 1 in 50 over each triangle, as a displacement; `room` makes it, since it needs a renderer."""
 
 TURNED = {"type": "rgb", "value": [0.55, 0.5, 0.98]}
 """A normal map that leans by 6°."""
@@ -82,6 +77,13 @@ MATERIALS: dict[str, dict[str, Any]] = {
 
 def room(floor: dict[str, Any]) -> Scene:
     """A closed cube of black sides that emit 1, but for the floor: whatever it reflects, it reflects uniform light."""
+    import mitsuba as mi
+
+    if floor.get("texture") is BUMPS:
+        slope = np.linspace(0, 0.02, 4, dtype=np.float32)[:, None, None] * np.ones(
+            (1, 4, 1), dtype=np.float32
+        )
+        floor = floor | {"texture": {"type": "bitmap", "bitmap": mi.Bitmap(slope), "raw": True}}
     vertices, faces = meshes.cube(np.linspace(-1, 1, 5))
     sides = faces.reshape(6, -1, 3)
     rest = np.concatenate([*sides[:4], sides[5]])
@@ -106,6 +108,8 @@ METHODS = {
 
 HOLES = "what lies behind a hole is asked of probes in front of it"
 
+LEANING = "principled is taken apart at the normal below the map, as Mitsuba tells nobody the other"
+
 
 @case("methods over {covering}", covering=tuple(MATERIALS), quick=("principled", "mask"))
 def floor_of(covering: str) -> Found:
@@ -126,11 +130,17 @@ def floor_of(covering: str) -> Found:
         # A lightmap has no glossy light, and says so.
         for lobe in ("diffuse",) if method is lightmap.METHOD else ("diffuse", "specular"):
             known = HOLES if "mask" in covering and lobe == "specular" and "field" in method.id else ""
+            if (
+                covering in ("principled normal map", "principled bump")
+                and lobe == "diffuse"
+                and method is not path_traced.METHOD
+            ):
+                known = LEANING
             yield Check(
                 "methods",
                 f"{method.id}: {lobe} light, of all of it",
                 abs(means[lobe] - answer[lobe]) / total,
-                bound,
+                EXACT if lobe == "diffuse" else bound,  # which all of them have from the lightmap
                 "path tracing with 1024 paths",
                 known,
             )
