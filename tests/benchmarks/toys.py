@@ -125,3 +125,31 @@ WRONG = found(
 )
 CONSTANT = found("Constant", knobs=(SHADE, STYLE, PAUSE), channels=("color",), budget="shade")
 PLAIN = found("Plain", knobs=(SHADE,))
+
+
+class Learner:
+    """Trains: keeps the mean of what it is given, or fails."""
+
+    def __init__(self, settings):
+        self.settings = dict(settings)
+
+    def train(self, training):
+        if self.settings["how"] == "failing":
+            raise ValueError("nothing to learn")
+        mean = np.mean([frame["color"].mean() for frame in training.views])
+        (training.folder / "mean.txt").write_text(f"{mean} {training.views.rooms} {training.seconds}")
+
+    def prepare(self, site):
+        self.mean = float((site.weights / "mean.txt").read_text().split()[0])
+        assert not list(site.folder.rglob("*.exr"))
+
+    def render(self, view, stages):
+        return Prediction(image(view, self.mean))
+
+
+LEARNER = found(
+    "Learner",
+    knobs=(Knob("how", "well", ("well", "failing"), "what goes wrong", trains=True),),
+    channels=("color",),
+    trains=True,
+)
