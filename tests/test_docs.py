@@ -51,7 +51,7 @@ def command_lines(page: str) -> list[list[str]]:
 
 
 def commands_of(program: str) -> list[list[str]]:
-    pages = ("README.md", "docs/datasets.md", "docs/rooms.md")
+    pages = ("README.md", "docs/datasets.md", "docs/rooms.md", "docs/cluster.md")
     return [words for page in pages for words in command_lines(page) if words[0] == program]
 
 

@@ -18,7 +18,7 @@ from gibench.errors import GibenchError
 #: Exit code by the name of the error; every other `GibenchError` is a failure, 1.
 EXIT_CODES = {
     **dict.fromkeys(("RecipeError", "FolderError", "DatasetError", "SceneFileError", "GateError"), 2),
-    **dict.fromkeys(("NoPlaceForCamera", "BadScene"), 2),
+    **dict.fromkeys(("NoPlaceForCamera", "BadScene", "ClusterError"), 2),
     **dict.fromkeys(("TrackError", "RegistryError", "ResultsError", "MethodError", "UnknownMetricError"), 2),
     "Interrupted": 130,
 }

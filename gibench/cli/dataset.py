@@ -101,6 +101,12 @@ def make(
     define: Parameters = None,
     variant: Annotated[str, typer.Option(help="Mitsuba's, or auto: the fastest that works.")] = "auto",
     workers: Annotated[int, typer.Option(help="Processes that render at the same time.")] = 1,
+    cluster: Annotated[
+        str | None,
+        typer.Option(
+            help="Make the rooms on Dask: a scheduler's address or file, or local:N.", show_default=False
+        ),
+    ] = None,
     dry_run: Annotated[
         bool,
         typer.Option("--dry-run", help="Build and check the rooms; keep nothing, estimate time and disk."),
@@ -113,6 +119,8 @@ def make(
         raise _usage("--preset and --recipe exclude each other: keep one of them")
     if not 1 <= workers <= MOST_WORKERS:
         raise _usage(f"--workers: {workers} is not allowed; allowed is an integer from 1 to {MOST_WORKERS}")
+    if cluster is not None and workers != 1:
+        raise _usage("--cluster and --workers exclude each other: a cluster has workers of its own")
     if scene and (rooms is not None or kind is not None):
         raise _usage("--scene takes the place of rooms: leave out --rooms and --kind")
     if cameras is not None and views is None:
@@ -160,12 +168,14 @@ def make(
         "--cameras": cameras,
         "--variant": None if variant == "auto" else variant,
         "--workers": None if workers == 1 else workers,
+        "--cluster": cluster,
     }
     words = [str(word) for option, value in given.items() if value is not None for word in (option, value)]
     words += scene_words(scene, up, scale, allow_missing, allow_outside, define)
     from gibench.cli.making import make_and_tell
 
-    make_and_tell(root, chosen, variant, workers, shlex.join(["make-dataset", *words]))
+    command = shlex.join(["make-dataset", *words])
+    make_and_tell(root, chosen, variant, workers, command, cluster)
 
 
 @app.command()

@@ -22,11 +22,19 @@ MOVING = {"camera": "the camera moves", "light": "the light moves", "both": "cam
 QUIET_RULES = ("property_names", "transform_tags")
 
 
-def make_and_tell(root: Path, recipe: Recipe, variant: str, workers: int, command: str) -> None:
+def make_and_tell(
+    root: Path, recipe: Recipe, variant: str, workers: int, command: str, cluster: str | None = None
+) -> None:
     """Make a dataset with a progress bar, then say what there is."""
     with making() as on_progress:
         summary = make(
-            root, recipe, variant=variant, workers=workers, command=command, on_progress=on_progress
+            root,
+            recipe,
+            variant=variant,
+            workers=workers,
+            cluster=cluster,
+            command=command,
+            on_progress=on_progress,
         )
     if summary.made == 0:
         say(f"{root} is already complete")

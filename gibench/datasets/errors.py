@@ -20,6 +20,10 @@ class MakingError(GibenchError):
     """Making a dataset stopped half-way; the rooms that are whole stay valid."""
 
 
+class ClusterError(MakingError):
+    """A cluster that does not answer, has no workers, or has some that would make other pixels."""
+
+
 class BadScene(MakingError):
     """A scene file that turned out to be wrong while its room was made."""
 

@@ -73,6 +73,7 @@ def make(
     *,
     variant: str = "auto",
     workers: int = 1,
+    cluster: str | None = None,
     command: str = "",
     on_progress: Callable[[Progress], None] = lambda progress: None,
     work: pool.Work | None = None,
@@ -80,7 +81,8 @@ def make(
     """Make a dataset, continue one that was stopped, or extend one by rooms.
 
     root: its folder; new, empty, or holding a dataset of the same recipe. workers: processes that render at
-    the same time; pixels do not depend on it. command: how to do the same again, for the record and for
+    the same time; pixels do not depend on it. cluster: where rooms are made instead, see
+    `cluster.run_rooms`. command: how to do the same again, for the record and for
     messages. work: what workers do, by default `RoomMaker` under the `Renderer` of `variant`.
 
     Raises `FolderError`, `RecipeError` before anything is made; `MakingError` and `Interrupted` half-way,
@@ -93,7 +95,7 @@ def make(
     with folder.claimed(root):
         run = _Run(root, recipe, command, on_progress)
         try:
-            run.do(work, workers)
+            run.do(work, workers, cluster)
             run.finish(started)
         except KeyboardInterrupt:
             run.tidy(started)
@@ -154,9 +156,15 @@ class _Run:
         self.progress.rejected_rooms.update(rejected)
         self.rooms = sorted(set(range(recipe.rooms)) - set(whole) - set(rejected))
 
-    def do(self, work: pool.Work, workers: int) -> None:
+    def do(self, work: pool.Work, workers: int, cluster: str | None) -> None:
         self.on_progress(self.progress)
-        if self.rooms:
+        if self.rooms and cluster is not None:
+            from gibench.datasets.cluster import run_rooms
+
+            # What a dead worker left of a room is removed at the end: another may be making it by now.
+            listener = pool.Listener(self._ready, self._message, self._done, self._forget_frames, self._told)
+            run_rooms(work, self.rooms, listener, cluster=cluster, root=self.root)
+        elif self.rooms:
             listener = pool.Listener(self._ready, self._message, self._done, self._died, self._told)
             pool.run_rooms(work, self.rooms, listener, workers=min(workers, len(self.rooms)))
 
@@ -193,8 +201,11 @@ class _Run:
             self.progress.rejected_views += sum(record["rejections"].values())
         self.on_progress(self.progress)
 
-    def _died(self, room: int) -> None:
+    def _forget_frames(self, room: int) -> None:
         self.progress.frames_done -= self.frames_of.pop(room, 0)
+
+    def _died(self, room: int) -> None:
+        self._forget_frames(room)
         folder.remove_partials(self.root, room)
 
     def _told(self, remark: str) -> None:

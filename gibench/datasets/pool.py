@@ -272,7 +272,7 @@ def _worker(connection: Connection, work: Work) -> None:
             if isinstance(problem, SceneFileError):
                 connection.send(("bad scene", str(problem)))
             else:
-                connection.send(("failed", _explained(problem, room)))
+                connection.send(("failed", explained(problem, room)))
 
 
 def leave_signals_to_parent() -> None:
@@ -290,7 +290,8 @@ def end_with_parent() -> None:
     os._exit(1)
 
 
-def _explained(problem: Exception, room: int | None) -> str:
+def explained(problem: Exception, room: int | None) -> str:
+    """A failure in one line, with the room that it happened in."""
     place = "" if room is None else f"room {room}: "
     if isinstance(problem, GibenchError):
         return f"{place}{problem}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import importlib.metadata
 import math
@@ -258,7 +259,7 @@ class RoomMaker:
             record = self._filled(partial, room, report)
             (partial / RECORD).write_bytes(as_json(record))
             sync_tree(partial)
-            partial.rename(final)
+            _renamed(partial, final)
         except (RejectedRoom, NoPlaceForCamera) as reason:
             shutil.rmtree(partial)
             if len(self.recipe.scenes) == 1:
@@ -348,6 +349,16 @@ class RoomMaker:
             "seconds": rendered.seconds,
             "seed": frame_seed(self.recipe, room.index, view),
         }
+
+
+def _renamed(partial: Path, final: Path) -> None:
+    """Give a whole room its name. A room that another worker has made in the meantime is the same, and stays."""
+    try:
+        partial.rename(final)
+    except OSError as problem:
+        if problem.errno not in (errno.EEXIST, errno.ENOTEMPTY) or not (final / RECORD).is_file():
+            raise
+        shutil.rmtree(partial, ignore_errors=True)
 
 
 class Stopwatch:

@@ -1,0 +1,276 @@
+"""Rooms on Dask, with real schedulers and worker processes; only the renderer is a fake."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from gibench.cli import run
+from gibench.cli.app import make_app
+from gibench.datasets import cluster, folder, open_dataset, pool
+from gibench.datasets.errors import ClusterError, FolderError, Interrupted, MakingError
+from gibench.datasets.making import make
+from gibench.datasets.pool import Report
+from gibench.datasets.room_making import RoomMaker
+from tests.datasets.fakes import Broken, Killed, Setup, fake_work, tiny
+
+pytest.importorskip("distributed")
+
+ENVIRONMENT = {**os.environ, "PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path)}
+
+
+def frames_of(root: Path) -> dict[str, str]:
+    return {
+        str(path.relative_to(root)): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in sorted(root.glob("rooms/0*/frames/*.exr"))
+    }
+
+
+def made_locally(root: Path, rooms: int) -> dict[str, str]:
+    make(root, tiny(rooms), work=fake_work(root, tiny(rooms)))
+    return frames_of(root)
+
+
+def left_behind(root: Path) -> list[str]:
+    return [p.name for p in [*root.iterdir(), *(root / "rooms").iterdir()] if p.name.startswith(".")]
+
+
+def dask(*words: str) -> subprocess.Popen[bytes]:
+    """A process of Dask as a person or a batch system starts it."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "dask", *words],
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=ENVIRONMENT, start_new_session=True,
+    )  # fmt: skip
+
+
+def scheduler(file: Path, port: int = 0) -> subprocess.Popen[bytes]:
+    file.unlink(missing_ok=True)
+    process = dask(
+        "scheduler",
+        "--scheduler-file",
+        str(file),
+        "--host",
+        "127.0.0.1",
+        "--port",
+        str(port),
+        "--no-dashboard",
+    )
+    wait_until(file.exists)
+    return process
+
+
+def wait_until(condition, seconds: float = 120) -> None:
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "nothing happened"
+        time.sleep(0.05)
+
+
+def killed(*processes: subprocess.Popen[bytes]) -> None:
+    for process in processes:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+
+
+@pytest.fixture(scope="module")
+def workplace(tmp_path_factory):
+    """A scheduler's file, and two workers that were started by hand, as batch jobs are."""
+    file = tmp_path_factory.mktemp("dask") / "scheduler.json"
+    processes = [scheduler(file)]
+    for name in ("one", "two"):
+        words = ["--nthreads", "1", "--name", name, "--no-dashboard", "--death-timeout", "300"]
+        processes.append(dask("worker", "--scheduler-file", str(file), *words))
+    yield file
+    killed(*processes)
+
+
+def test_a_cluster_of_this_machine_and_a_local_run_make_the_same_and_go_on_for_each_other(tmp_path):
+    expected = made_locally(tmp_path / "local", 5)
+    root = tmp_path / "both"
+    summary = make(root, tiny(3), cluster="local:2", work=fake_work(root, tiny(3)))
+    assert (summary.made, summary.frames) == (3, 6)
+    assert left_behind(root) == []
+    make(root, tiny(5), work=fake_work(root, tiny(5)))
+    assert frames_of(root) == expected
+    assert open_dataset(root).manifest["complete"]
+
+
+def test_workers_started_by_hand_that_die_hang_and_refuse(workplace, tmp_path):
+    """One after another on the same cluster: what happens to one run leaves the workers to the next."""
+    root = tmp_path / "plain"
+    seen = []
+    make(
+        root, tiny(6), cluster=str(workplace), work=fake_work(root, tiny(6)),
+        on_progress=lambda p: seen.append((p.rooms_done, p.frames_done)),
+    )  # fmt: skip
+    assert frames_of(root) == made_locally(tmp_path / "local", 6)
+    assert seen[-1] == (6, 12)
+    assert left_behind(root) == []
+
+    # A room whose worker is killed goes to another worker.
+    root = tmp_path / "killed"
+    work = pool.Work(Setup(), Killed(RoomMaker(root, tiny(4)), room=1, times=1))
+    make(root, tiny(4), cluster=str(workplace), work=work)
+    assert list(frames_of(root)) == [name for name in frames_of(tmp_path / "local") if "00000" in name][:8]
+    assert left_behind(root) == []
+
+    # A job that fails ends the run with its reason; what is whole stays.
+    root = tmp_path / "broken"
+    full = OSError(28, "No space left on device")
+    work = pool.Work(Setup(), Broken(RoomMaker(root, tiny(4)), 2, full))
+    with pytest.raises(MakingError, match=r"^room 2: the disk is full"):
+        make(root, tiny(4), cluster=str(workplace), work=work)
+    make(root, tiny(4), cluster=str(workplace), work=fake_work(root, tiny(4)))
+    assert len(frames_of(root)) == 8
+    assert left_behind(root) == []
+
+
+def test_a_room_that_takes_three_workers_with_it_is_set_aside_by_name(tmp_path):
+    root = tmp_path / "d"
+    work = pool.Work(Setup(), Killed(RoomMaker(root, tiny(4)), room=1, times=99))
+    summary = make(root, tiny(4), cluster="local:2", work=work)
+    assert summary.made == 3
+    assert list(summary.manifest["rejected_rooms"]) == ["1"]
+    assert "3 workers that made it died" in summary.manifest["rejected_rooms"]["1"]
+    assert len((tmp_path / "tries").read_text()) == cluster.DEATHS
+    assert left_behind(root) == []
+
+
+@dataclass
+class Stopped:
+    """A job whose worker is stopped in the middle of one room, the first time."""
+
+    job: RoomMaker
+    room: int
+
+    def __call__(self, room: int, report: Report):
+        mark = self.job.root.parent / "stopped"
+        if room == self.room and not mark.exists():
+            mark.write_text(str(os.getpid()))
+            os.kill(os.getpid(), signal.SIGSTOP)
+        return self.job(room, report)
+
+
+def test_a_worker_that_hangs_is_given_up_and_its_room_made_by_another(tmp_path, monkeypatch):
+    monkeypatch.setattr(cluster, "SILENCE", 20.0)  # a busy machine is silent too
+    root = tmp_path / "d"
+    make(root, tiny(4), cluster="local:2", work=pool.Work(Setup(), Stopped(RoomMaker(root, tiny(4)), 1)))
+    assert (tmp_path / "stopped").exists()
+    assert frames_of(root) == made_locally(tmp_path / "local", 4)
+
+
+def test_a_scheduler_that_is_killed_and_started_again(tmp_path):
+    file, root = tmp_path / "scheduler.json", tmp_path / "d"
+    first = scheduler(file)
+    port = int(file.read_text().split("tcp://127.0.0.1:")[1].split('"')[0])
+    address = f"tcp://127.0.0.1:{port}"
+    words = ["worker", address, "--nthreads", "1", "--no-dashboard", "--death-timeout", "120"]
+    worker, replaced = dask(*words), []
+
+    def break_off(progress) -> None:
+        if progress.rooms_done == 2 and not replaced:
+            killed(first, worker)
+            replaced.extend([scheduler(file, port), dask(*words)])
+
+    try:
+        work = fake_work(root, tiny(6), slow=0.05)
+        make(root, tiny(6), cluster=address, work=work, on_progress=break_off)
+        assert replaced
+        assert frames_of(root) == made_locally(tmp_path / "local", 6)
+    finally:
+        killed(first, worker, *replaced)
+
+
+def test_ctrl_c_stops_rooms_that_are_being_made_and_keeps_those_that_are_whole(workplace, tmp_path):
+    root = tmp_path / "d"
+
+    def stop(progress) -> None:
+        if progress.rooms_done >= 2:
+            raise KeyboardInterrupt
+
+    work = fake_work(root, tiny(30), slow=0.2)
+    with pytest.raises(Interrupted, match=r"of 30 rooms whole; to continue run `again`"):
+        make(root, tiny(30), cluster=str(workplace), work=work, command="again", on_progress=stop)
+    assert open_dataset(root).manifest["complete"] is False
+    time.sleep(1.0)  # rooms in hand end at their next frame
+    whole = folder.whole_rooms(root)
+    assert 2 <= len(whole) <= 6
+    time.sleep(1.0)
+    assert folder.whole_rooms(root) == whole
+    make(root, tiny(30), cluster=str(workplace), work=fake_work(root, tiny(30)))
+    assert len(frames_of(root)) == 60
+    assert left_behind(root) == []
+
+
+def test_two_runs_on_one_folder(workplace, tmp_path):
+    root, refused = tmp_path / "d", []
+
+    def another() -> None:
+        try:
+            make(root, tiny(2), cluster=str(workplace), work=fake_work(root, tiny(2)))
+        except FolderError as problem:
+            refused.append(str(problem))
+
+    def start_another(progress) -> None:
+        if progress.frames_done == 1 and not refused:
+            thread = threading.Thread(target=another)
+            thread.start()
+            thread.join()
+
+    make(root, tiny(2), cluster=str(workplace), work=fake_work(root, tiny(2)), on_progress=start_another)
+    assert "in use by another run" in refused[0]
+
+
+def test_clusters_that_cannot_be_used(workplace, tmp_path, monkeypatch, capsys):
+    def refused(words: list[str]) -> str:
+        out = ["--out", str(tmp_path / "d"), "--preset", "smoke"]
+        assert run(make_app, [*out, *words]) == 2
+        assert not (tmp_path / "d").exists()
+        said = capsys.readouterr().err.splitlines()
+        assert said[-1].startswith("error: ")
+        return said[-1]
+
+    assert "exclude each other" in refused(["--cluster", "local:2", "--workers", "2"])
+    for wrong in ("local:0", "local:", "local:x", "local:٣", f"local:{10**20}"):
+        assert "write local:N with N from 1 to" in refused(["--cluster", wrong])
+    assert "there is no scheduler file" in refused(["--cluster", str(tmp_path / "none.json")])
+    monkeypatch.setattr(cluster, "PATIENCE", 1.0)
+    assert "nobody answers at tcp://127.0.0.1:9" in refused(["--cluster", "tcp://127.0.0.1:9"])
+    lonely = scheduler(tmp_path / "lonely.json")
+    try:
+        assert "has no workers: start some with" in refused(["--cluster", str(tmp_path / "lonely.json")])
+    finally:
+        killed(lonely)
+    monkeypatch.setattr(cluster, "PATIENCE", 60.0)
+
+    here = cluster._versions()
+    monkeypatch.setattr(cluster, "_versions", lambda: {**here, "mitsuba": "1.2.3"})
+    said = refused(["--cluster", str(workplace)])
+    assert "would make other pixels (mitsuba: " in said
+    assert "1.2.3 here" in said
+    monkeypatch.undo()
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    assert "pip install 'gibench[cluster]'" in refused(["--cluster", "local:1"])
+
+
+def test_workers_that_do_not_see_the_folder_are_named():
+    here = cluster._versions()
+    answer = {"sees": False, "versions": here, "host": "node7"}
+    with pytest.raises(ClusterError, match=r"worker tcp://a:1 on node7 does not see the folder"):
+        cluster._refuse_other("tcp://a:1", answer, here)
+    with pytest.raises(ClusterError, match=r"worker tcp://a:1 cannot be used: No module named 'gibench'"):
+        cluster._refuse_other("tcp://a:1", ModuleNotFoundError("No module named 'gibench'"), here)
+    with pytest.raises(ClusterError, match=r"gibench: None there"):
+        cluster._refuse_other("tcp://a:1", {"sees": True, "versions": {}, "host": ""}, here)
+    cluster._refuse_other("tcp://a:1", {"sees": True, "versions": here, "host": ""}, here)
