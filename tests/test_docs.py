@@ -274,6 +274,12 @@ def test_contributors_are_told_what_holds_the_house_together():
         assert set(re.findall(r"`(\w+)`", listed[room])) == MAY_IMPORT[room]
 
 
+def test_every_page_is_in_the_site():
+    listed = set(re.findall(r"[\w/-]+\.md", (ROOT / "mkdocs.yml").read_text("utf-8")))
+    there = {path.relative_to(ROOT / "docs").as_posix() for path in (ROOT / "docs").rglob("*.md")}
+    assert listed == there
+
+
 def test_results_are_a_page_its_figures_and_the_leaderboards():
     """All else of a board is packed by `gibench bench report --archive`: it would fill the repository."""
     folder = ROOT / "docs/results"
