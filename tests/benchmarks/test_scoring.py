@@ -169,9 +169,9 @@ def test_a_damaged_prediction_and_a_damaged_result_are_named_and_the_rest_is_sco
     copy.result_file(second).write_text("{")
     copy.score_file(copy.ids()[3]).unlink()
     scored = score(copy)
-    assert scored.done == 2
+    assert scored.done == 1
     assert len(scored.problems) == 2
-    assert any("0001.exr cannot be read" in problem for problem in scored.problems)
+    assert any(f"{first}.json: its frame 0001.exr was changed" in problem for problem in scored.problems)
     assert any(f"{second}.json is damaged" in problem for problem in scored.problems)
     assert copy.score_file(copy.ids()[3]).exists()
 
