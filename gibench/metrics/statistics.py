@@ -137,7 +137,9 @@ def _interval(
     else:
         from scipy.stats import t
 
-        half = float(t.ppf((1 + level) / 2, variance**2 / uncertainty) * np.sqrt(variance))
+        # A sum has at least the degrees of freedom of its poorest part; what is taken out of a part can feign fewer.
+        freedom = max(1.0, variance**2 / uncertainty)
+        half = float(t.ppf((1 + level) / 2, freedom) * np.sqrt(variance))
     return Interval(mean, mean - half, mean + half, level, len(names), effect.size)
 
 

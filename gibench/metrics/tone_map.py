@@ -75,8 +75,8 @@ def tone_map(radiance: ArrayLike, exposure: ArrayLike) -> FloatArray:
     Examples:
         >>> import numpy as np
         >>> radiance = np.array([[[0.0, 0.09, 50.0]]])
-        >>> tone_map(radiance, 2.0).round(3)
-        array([[[0.   , 0.461, 1.   ]]])
+        >>> tone_map(radiance, 2.0).round(3).tolist()
+        [[[0.0, 0.461, 1.0]]]
 
     References:
         IEC 61966-2-1:1999, section 5.2 (the sRGB transfer function).

@@ -386,5 +386,7 @@ def estimate_cues(
             varying = [dr.opaque(mi.UInt32, n) for n in (number, first, width)]
             for name, value in kernel(eye, *varying, count, samples).items():
                 sums = total.setdefault(name, np.zeros((width * height, 3)))
-                sums[first : first + count] += np.array(value).T.astype(np.float64) * (samples / spp)
+                # Component by component: interleaving would take a kernel of its own for every size.
+                found = np.stack([np.array(part) for part in value], axis=-1)
+                sums[first : first + count] += found.astype(np.float64) * (samples / spp)
     return {name: frame_of(value, resolution) for name, value in total.items()}

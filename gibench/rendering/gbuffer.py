@@ -204,7 +204,13 @@ def render_gbuffer(
         past = {} if previous_camera is None else camera_arrays(previous_camera, resolution)
         across = dr.opaque(mi.UInt32, width)  # one kernel for all sizes
         found = kernel(camera_arrays(camera, resolution), across, width * height, past)
-        columns = {name: np.array(value).reshape(-1, width * height).T for name, value in found.items()}
+        # Component by component: a vector as a whole would be interleaved by a kernel of its own for every size.
+        columns = {
+            name: np.stack(
+                [np.array(part) for part in (value if dr.depth_v(value) > 1 else [value])], axis=-1
+            )
+            for name, value in found.items()
+        }
     return {
         name: np.ascontiguousarray(columns[name])
         .reshape(height, width, CHANNELS[name].components)

@@ -112,7 +112,7 @@ def test_a_report_in_one_file_and_out_of_it(capsys, tmp_path, results):
     assert (site / "leaderboard.csv").is_file()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["board.zip", "site"]
     assert "site exists: choose a new folder" in refused(capsys, "report", packed, "--out", site, code=1)
-    assert "is a packed report: name a new folder" in refused(capsys, "report", packed)
+    assert "is a packed report: name it alone" in refused(capsys, "report", packed)
     assert "name a folder with --out, or a file with --archive" in refused(capsys, "report", results.root)
 
 

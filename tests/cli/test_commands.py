@@ -83,7 +83,8 @@ def test_the_recorded_command_makes_the_same_again(monkeypatch, tmp_path):
         str(tmp_path / "my data"),
     ]
     assert run(make_app, words) == 0
-    root, recipe, variant, workers, command = asked[0]
+    root, recipe, variant, workers, command, cluster = asked[0]
+    assert cluster is None
     assert (root, variant, workers) == (tmp_path / "my data", "auto", 2)
     assert (recipe.seed, recipe.resolution, recipe.kinds, recipe.spp) == (
         5,

@@ -65,7 +65,7 @@ def test_every_broken_file_is_named(copy):
 
 def test_a_frame_of_the_wrong_kind_is_found_even_where_its_hash_is_right(copy):
     path = copy / "rooms/000000/frames/0000.exr"
-    arrays = pixels(tuple(CHANNELS)[:-1], (16, 12), seed=1)
+    arrays = pixels(tuple(name for name in CHANNELS if name != "motion_valid"), (16, 12), seed=1)
     path.write_bytes(encode(arrays))
     record = json.loads((copy / "rooms/000000/frames.json").read_text())
     record["frames"][0]["bytes"] = path.stat().st_size

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from gibench.errors import GibenchError
+from gibench.generators import rooms
 from gibench.generators.layouts.placement import RejectedRoom
 from gibench.generators.materials import is_glossy
 from gibench.generators.parts import Environment
@@ -107,12 +108,13 @@ def test_a_third_of_rooms_shows_reflections():
     assert glossy >= 10
 
 
-def test_rejections_are_counted_by_reason():
+def test_rejections_are_counted_by_reason(monkeypatch):
     a_room = room(1)
     assert all(isinstance(k, str) and v > 0 for k, v in a_room.rejections.items())
     assert GRID == (24, 18)
+    monkeypatch.setattr(rooms, "LEAST_FREE", 100.0)  # m² of floor
     with pytest.raises(RejectedRoom, match="failed 12 times") as caught:
-        sample_room(1, 0, kind="living", width=3.0, depth=3.5, notch=[0, 0.8, 1.3], height=2.3, views=80)
+        sample_room(1, 0, kind="living", width=3.0, depth=3.5, height=2.3, views=1)
     assert isinstance(caught.value, GibenchError)
 
 

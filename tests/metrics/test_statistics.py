@@ -147,3 +147,12 @@ def test_bad_input():
     for keywords in ({"level": 1.0}, {"level": 0.0}):
         with pytest.raises(MetricInputError, match="level"):
             mean_interval([1.0], [0], **keywords)
+
+
+def test_few_rooms_and_seeds_give_no_absurd_interval():
+    """What rooms and seeds have together is taken out of the spread of the seeds: next to nothing may be left."""
+    rng = np.random.default_rng(17)
+    for _ in range(200):
+        values = 0.04 * rng.uniform(0.97, 1.03, (3, 28))
+        interval = mean_interval(values, np.repeat(["a", "b"], 14))
+        assert interval.high - interval.low < 0.04

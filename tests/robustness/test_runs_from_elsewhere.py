@@ -74,7 +74,7 @@ NEEDED = ("config", "title", "family", "label", "room", "kind", "created", "mach
         ("scores", {"frames": {"full": {"rmse": [0.1] * 9}}}),
         ("scores", {"sequences": []}),
         ("scores", {"skipped": None}),
-        ("scores", {"exposure": -1.0}),
+        ("scores", {"exposures": [-1.0]}),
     ],
 )
 def test_what_says_something_else_is_named_and_nothing_more(run, tmp_path, capfd, file, change):
