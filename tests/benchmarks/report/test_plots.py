@@ -5,16 +5,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from gibench.benchmarks.report.error_against_cost import COSTS, error_against
+from gibench.benchmarks.report.error_along_path import best_settings, error_along_path
 from gibench.benchmarks.report.labels import Box
 from gibench.benchmarks.report.plot_style import COLOURS, LINES, MARKERS, log_ticks, look, save, tick_text
-from gibench.benchmarks.report.plots import (
-    COSTS,
-    best_settings,
-    error_against,
-    error_along_path,
-    stage_bars,
-    write_plots,
-)
+from gibench.benchmarks.report.plots import write_plots
+from gibench.benchmarks.report.stage_bars import stage_bars
 from gibench.benchmarks.report.summary import summarise
 from tests.benchmarks.report.synthetic import Setting, SyntheticRun
 

@@ -1,0 +1,145 @@
+"""What plots share: figures, panels, titles, axes of error, noise floors, names at the ends of lines."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gibench.benchmarks.report.labels import spread
+from gibench.benchmarks.report.plot_style import BAND, FAINT, INK, PIXELS_PER_INCH, STYLE, set_log_axis
+from gibench.benchmarks.report.summary import Summary
+from gibench.benchmarks.report.wording import printable
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+WIDTH = 6.5
+"""Inches: the width of a page's text, so that the type stays as large as it was set."""
+
+FARTHEST_FLOOR = 30.0
+"""A floor this many times below the least error is told in words: shown in its place it would flatten the rest."""
+
+SMALL = 6.8
+"""Points: the type of labels."""
+
+LONGEST_LABEL = 48
+"""Characters of a name in a plot, which is about 130 of them wide."""
+
+
+def new_figure(width: float, height: float) -> tuple[Figure, Axes]:
+    """A figure of so many inches, and axes that leave room for a title and what axes say."""
+    import matplotlib
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(width, height), dpi=PIXELS_PER_INCH)
+        FigureCanvasAgg(figure)
+        left, right, bottom, top = 0.68, 0.22, 0.5, 0.56
+        axes = figure.add_axes(
+            (left / width, bottom / height, 1 - (left + right) / width, 1 - (bottom + top) / height)
+        )
+        axes.grid(True, zorder=0)
+        axes.set_axisbelow(True)
+    return figure, axes
+
+
+def new_panel(figure: Figure, inches: tuple[float, float, float, float]) -> Axes:
+    """Axes in a figure. inches: left, bottom, width, height."""
+    import matplotlib
+
+    width, height = figure.get_size_inches()
+    left, bottom, across, up = inches
+    with matplotlib.rc_context(STYLE):
+        axes = figure.add_axes((left / width, bottom / height, across / width, up / height))
+        axes.grid(True)
+        axes.set_axisbelow(True)
+    return axes
+
+
+def write_title(figure: Figure, title: str, about: str) -> None:
+    """Write a title, and below it in small type what the plot is about."""
+    height = figure.get_size_inches()[1]
+    figure.text(0.015, 1 - 0.09 / height, title, size=10, weight="bold", color=INK, va="top")
+    figure.text(0.015, 1 - 0.29 / height, about, size=SMALL, color=FAINT, va="top")
+
+
+def error_axis(
+    axes: Axes, lows: pd.Series, highs: pd.Series, means: pd.Series, floors: pd.Series, logarithmic: bool
+) -> None:
+    """Make the axis of errors hold means and intervals, and the noise floor where that leaves them room."""
+    floor = floors[np.isfinite(floors)]
+    low, high = float(min(lows.min(), means.min())), float(max(highs.max(), means.max()))
+    if logarithmic:
+        low = max(low, float(means.min()) / 10)
+        # The floor is shown in its place unless that leaves the methods no room.
+        if len(floor) and floor.mean() > 0 and floor.mean() > low / FARTHEST_FLOOR:
+            low = min(low, float(floor.mean()) / 1.3)
+        pad = max((high / low) ** 0.06, 1.05)
+        set_log_axis(axes, "y", low / pad, high * pad)
+    else:
+        low, high = float(min(low, *floor, high)), float(max(high, *floor))
+        pad = 0.06 * (high - low) or 0.05 * abs(high) or 1.0
+        axes.set_ylim(low - pad, high + pad)
+
+
+def noise_band(axes: Axes, floor: float, higher: bool) -> None:
+    """Draw the band in which the reference's own noise hides every difference."""
+    if not math.isfinite(floor):
+        return
+    bottom, top = axes.get_ylim()
+    shown = min(max(floor, bottom), top)
+    axes.axhspan(*((shown, top) if higher else (bottom, shown)), color=BAND, zorder=0.5, linewidth=0)
+    if bottom < floor < top:
+        axes.axhline(floor, color=FAINT, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1)
+
+
+def end_labels(figure: Figure, axes: Axes, ends: Sequence[tuple[str, float, str]]) -> None:
+    """Write the name of each line to the right of its end, moved apart, with a line from one to the other."""
+    scale = PIXELS_PER_INCH / 72
+    right = axes.get_xlim()[1]
+    bottom, top = axes.get_ylim()
+    pixels = [axes.transData.transform((right, min(max(value, bottom), top))) for _, value, _ in ends]
+    low, high = (axes.transAxes.transform((0, share))[1] for share in (0, 1))
+    heights = spread([float(at[1]) for at in pixels], 8.4 * scale, low, high)
+    inverse = figure.transFigure.inverted()
+    for (name, _, colour), (edge, at), y in zip(ends, pixels, heights, strict=True):
+        start, end = (edge + 2 * scale, at), (edge + 14 * scale, y)
+        leader(figure, inverse.transform([start, end]), colour)
+        x, height = inverse.transform((edge + 16 * scale, y))
+        figure.text(x, height, name, size=SMALL, color=INK, va="center_baseline")
+
+
+def leader(figure: Figure, ends: Any, colour: str = FAINT) -> None:
+    """Draw a thin line between two places of a figure, (2, 2)."""
+    from matplotlib.lines import Line2D
+
+    figure.add_artist(
+        Line2D(ends[:, 0], ends[:, 1], color=colour, linewidth=0.5, transform=figure.transFigure)
+    )
+
+
+def widest(figure: Figure, texts: Sequence[str]) -> float:
+    """Measure the widest of some labels, in inches."""
+    renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
+    made = [figure.text(0, 0, text, size=SMALL) for text in texts]
+    widest = max(text.get_window_extent(renderer).width for text in made)
+    for text in made:
+        text.remove()
+    return float(widest) / PIXELS_PER_INCH
+
+
+def entry_name(summary: Summary, entry: Any) -> str:
+    """The label of a setting, short."""
+    return short(str(summary.entries.loc[entry, "label"]))
+
+
+def short(label: str) -> str:
+    """Cut what would fill a plot: its begin and its end tell settings of one method apart, the tables say all of it."""
+    label = printable(" ".join(label.split()))
+    return label if len(label) <= LONGEST_LABEL else f"{label[: LONGEST_LABEL - 20]} … {label[-17:]}"
