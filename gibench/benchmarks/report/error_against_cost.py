@@ -114,6 +114,8 @@ def _points(
     points = entries.drop(columns="rooms").merge(scores, left_index=True, right_on="entry").set_index("entry")
     points["cost"] = points[cost.column] / cost.unit
     points["whole"] = points["rooms"] == points["rooms"].max()
+    # Of one frame in one room there is no interval: its ends lie at infinity.
+    points[["low", "high"]] = points[["low", "high"]].replace([-np.inf, np.inf], np.nan)
     return points[np.isfinite(points["cost"]) & np.isfinite(points["mean"])]
 
 
@@ -196,7 +198,8 @@ def _curves(axes: Axes, x: pd.Series, points: pd.DataFrame, summary: Summary) ->
         )
         taken += _along(axes, across, up)
         for at, low, high in zip(across, own["low"], own["high"], strict=True):
-            taken += _along(axes, np.array([at, at]), np.array([low, high]))
+            if math.isfinite(low) and math.isfinite(high):
+                taken += _along(axes, np.array([at, at]), np.array([low, high]))
     return taken
 
 

@@ -74,7 +74,7 @@ def error_axis(
 ) -> None:
     """Make the axis of errors hold means and intervals, and the noise floor where that leaves them room."""
     floor = floors[np.isfinite(floors)]
-    low, high = float(min(lows.min(), means.min())), float(max(highs.max(), means.max()))
+    low, high = float(np.nanmin([*lows, *means])), float(np.nanmax([*highs, *means]))
     if logarithmic:
         low = max(low, float(means.min()) / 10)
         # The floor is shown in its place unless that leaves the methods no room.
