@@ -12,6 +12,7 @@ import numpy as np
 from gibench.benchmarks.report.figures import (
     SMALL,
     WIDTH,
+    cost_axis,
     error_axis,
     leader,
     new_figure,
@@ -27,7 +28,6 @@ from gibench.benchmarks.report.plot_style import (
     LINES,
     PIXELS_PER_INCH,
     look,
-    set_log_axis,
     tick_text,
 )
 from gibench.benchmarks.report.runs import part_title
@@ -88,7 +88,7 @@ def error_against(
         write_title(figure, title, _about(summary, track, part, machine))
         logarithmic = not higher and bool((points["mean"] > 0).all())
         error_axis(axes, points["low"], points["high"], points["mean"], points["floor"], logarithmic)
-        nothing = _cost_axis(axes, points["cost"])
+        nothing = cost_axis(axes, points["cost"])
         x = points["cost"].where(points["cost"] > 0, nothing)
         axes.set_xlabel(cost.axis)
         axes.set_ylabel(f"{metric_title(metric)}, {'higher' if higher else 'lower'} is better")
@@ -130,20 +130,6 @@ def _about(summary: Summary, track: str, part: str, machine: str | None) -> str:
     if machine:
         words.append(machine if len(machine) < 40 else machine[:38] + "…")
     return "  ·  ".join(words)
-
-
-def _cost_axis(axes: Axes, costs: pd.Series) -> float:
-    """Make the axis logarithmic, with a place for 0 at its left; give that place."""
-    positive = costs[costs > 0]
-    low, high = float(positive.min()), float(positive.max())
-    pad = max((high / low) ** 0.07, 1.3)
-    if (costs > 0).all():
-        set_log_axis(axes, "x", low / pad, high * pad)
-        return math.nan
-    nothing = low / max(3.0, (high / low) ** 0.2)
-    set_log_axis(axes, "x", nothing / pad, high * pad, [(nothing, "none")])
-    axes.axvline(math.sqrt(nothing * low), color=FAINT, linewidth=0.6, linestyle=(0, (1, 3)), zorder=1)
-    return nothing
 
 
 def _front(axes: Axes, x: pd.Series, points: pd.DataFrame, higher: bool) -> tuple[Any, Any]:

@@ -83,9 +83,23 @@ def error_axis(
         pad = max((high / low) ** 0.06, 1.05)
         set_log_axis(axes, "y", low / pad, high * pad)
     else:
-        low, high = float(min(low, *floor, high)), float(max(high, *floor))
+        low, high = float(min([low, high, *floor])), float(max([high, *floor]))
         pad = 0.06 * (high - low) or 0.05 * abs(high) or 1.0
         axes.set_ylim(low - pad, high + pad)
+
+
+def cost_axis(axes: Axes, costs: pd.Series, zero: str = "none") -> float:
+    """Make the axis logarithmic, with a place for 0 at its left, called `zero`; give that place, NaN without any."""
+    positive = costs[costs > 0]
+    low, high = float(positive.min()), float(positive.max())
+    pad = max((high / low) ** 0.07, 1.3)
+    if (costs > 0).all():
+        set_log_axis(axes, "x", low / pad, high * pad)
+        return math.nan
+    nothing = low / max(3.0, (high / low) ** 0.2)
+    set_log_axis(axes, "x", nothing / pad, high * pad, [(nothing, zero)])
+    axes.axvline(math.sqrt(nothing * low), color=FAINT, linewidth=0.6, linestyle=(0, (1, 3)), zorder=1)
+    return nothing
 
 
 def noise_band(axes: Axes, floor: float, higher: bool) -> None:
