@@ -18,12 +18,14 @@ FORMULA = ("=", "+", "-", "@", "\t", "\r")
 """What a text begins with that spreadsheets compute."""
 
 _WHO = ["track", "scene", "method", "label", "knobs", "seed", "machine", "result"]
+_LOOK = ["training", "step", "seconds", "error"]
 
 
 def write_csv_files(source: ReportSource, summary: Summary, out: Path) -> list[Path]:
-    """Write leaderboard.csv, frames.csv, sequences.csv, stages.csv and results.csv into a folder.
+    """Write leaderboard.csv, frames.csv, sequences.csv, stages.csv, training.csv and results.csv into a folder.
 
-    Times are milliseconds where a name ends in _ms or begins with ms, seconds where it ends in _s; memory is MB.
+    Times are milliseconds where a name ends in _ms or begins with ms, seconds where it ends in _s or is
+    seconds; memory is MB.
     """
     of = summary.results[_WHO]
     frames = source.frames.merge(of, on="result")
@@ -34,6 +36,7 @@ def write_csv_files(source: ReportSource, summary: Summary, out: Path) -> list[P
         "frames.csv": frames[[*_WHO, "frame", "ms", "part", "metric", "value", "noise_floor"]],
         "sequences.csv": source.sequences.merge(of, on="result")[[*_WHO, "part", "metric", "value"]],
         "stages.csv": source.stages.merge(of, on="result")[[*_WHO, "stage", "ms_median", "ms_p95"]],
+        "training.csv": source.curves.merge(of, on="result")[[*_WHO, *_LOOK]],
         "results.csv": summary.results.drop(columns="entry"),
     }
     for name, table in tables.items():

@@ -33,7 +33,10 @@ NOISE_BELOW = "noise floor, off the axis"
 
 
 def error_along_path(summary: Summary, track: str, part: str, metric: str) -> Figure | None:
-    """Plot error frame by frame, a panel a room, for the best setting of each method; None without such frames."""
+    """Plot error frame by frame, a panel a room, for the best setting of each method; None without such frames.
+
+    A sequence is a line. Stills follow nothing: they are points, without a line.
+    """
     from matplotlib.ticker import MaxNLocator
 
     chosen = best_settings(summary, track, part, metric)
@@ -52,7 +55,12 @@ def error_along_path(summary: Summary, track: str, part: str, metric: str) -> Fi
     first.remove()
     names = [entry_name(summary, entry) for entry in chosen]
     right = widest(figure, [*names, NOISE_BELOW]) + 0.3
-    title = f"{metric_title(metric)} along the path, the best setting of each method"
+    of_scene = summary.paths[summary.paths["scene"].isin(scenes)]
+    sequences = dict(
+        zip(zip(of_scene["scene"], of_scene["frame"], strict=True), of_scene["sequence"], strict=True)
+    )
+    where = "along the path" if any(sequences.values()) else "of each still"
+    title = f"{metric_title(metric)} {where}, the best setting of each method"
     write_title(figure, title, f"{part_title(part)}  ·  track {track}")
     for order, scene in enumerate(scenes):
         bottom = height - 0.62 - (order + 1) * (panel + gap) + gap - 0.1
@@ -69,24 +77,26 @@ def error_along_path(summary: Summary, track: str, part: str, metric: str) -> Fi
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         axes.set_title(scene, size=8, pad=3, loc="left")
         if order == len(scenes) - 1:
-            axes.set_xlabel("frame of the path")
+            axes.set_xlabel("frame of the path" if all(sequences.values()) else "frame; a point is a still")
         ends: list[tuple[str, float, str]] = []
         for entry in chosen:
             line = own[own["entry"] == entry].sort_values("frame")
             if line.empty:
                 continue
             style = look(methods.index(summary.entries.loc[entry, "method"]))
-            axes.plot(
-                line["frame"],
-                line["value"],
-                color=style["color"],
-                linestyle=style["linestyle"],
-                marker=style["marker"],
-                markersize=3.2,
-                markevery=max(1, len(line) // 8),
-                linewidth=1.1,
-                zorder=3,
-            )
+            following = line["frame"].map(lambda frame, scene=scene: sequences.get((scene, frame), ""))
+            for sequence, stretch in line.groupby(following, sort=False):
+                axes.plot(
+                    stretch["frame"],
+                    stretch["value"],
+                    color=style["color"],
+                    linestyle=style["linestyle"] if sequence else "none",
+                    marker=style["marker"],
+                    markersize=3.2,
+                    markevery=max(1, len(stretch) // 8) if sequence else 1,
+                    linewidth=1.1,
+                    zorder=3,
+                )
             ends.append((entry_name(summary, entry), float(line["value"].iloc[-1]), style["color"]))
         if math.isfinite(level):
             low, high = axes.get_ylim()

@@ -17,6 +17,7 @@ from gibench.benchmarks.report.runs import part_title
 from gibench.benchmarks.report.source import ReportSource
 from gibench.benchmarks.report.summary import Summary
 from gibench.benchmarks.report.tables import stage_times
+from gibench.benchmarks.report.trainings import TrainingCurve, trainings
 from gibench.benchmarks.report.wording import metric_title
 from gibench.datasets.files import write_whole
 from gibench.metrics import METRICS
@@ -27,12 +28,16 @@ SCRIPTS = (
     "leaderboard.js",
     "label_placement.js",
     "charts.js",
+    "training.js",
     "viewer.js",
     "main.js",
 )
 
 DIGITS = 4
 """Significant digits of the numbers on the page; the CSV files have all that matter."""
+
+MOST_LOOKS = 100
+"""Looks of a training on the page; the plots and training.csv have all of them."""
 
 
 def write_page(source: ReportSource, summary: Summary, out: Path) -> Path:
@@ -93,6 +98,24 @@ def page_data(source: ReportSource, summary: Summary) -> dict[str, Any]:
         "entries": _entries(source, summary),
         "scenes": scenes,
         "results": _results(source, summary, scenes, number_of),
+        "trainings": [_training(curve) for curve in trainings(source, summary)],
+    }
+
+
+def _training(curve: TrainingCurve) -> dict[str, Any]:
+    # Of hundreds of looks so many that a line shows no gaps, and always the best and those at the ends.
+    shown = set(np.linspace(0, len(curve.steps) - 1, min(MOST_LOOKS, len(curve.steps))).astype(int))
+    best = curve.best
+    looks = sorted(shown | ({best} if best is not None else set()))
+    return {
+        **{
+            name: getattr(curve, name)
+            for name in ("track", "machine", "family", "method", "name", "scenes", "seed")
+        },
+        "steps": [int(curve.steps[look]) for look in looks],
+        "seconds": _numbers(curve.seconds[looks]),
+        "errors": _numbers(curve.errors[looks]),
+        "best": looks.index(best) if best is not None else None,
     }
 
 
@@ -136,6 +159,8 @@ def _costs(row: Any) -> dict[str, float | None]:
 
 def _scenes(source: ReportSource, summary: Summary) -> list[dict[str, Any]]:
     frames = source.frames[["result", "frame"]].drop_duplicates()
+    paths = summary.paths
+    sequences = dict(zip(zip(paths["scene"], paths["frame"], strict=True), paths["sequence"], strict=True))
     of = frames.merge(summary.results[["result", "scene", "track"]], on="result")
     floors = summary.floor.groupby(["scene", "part", "metric"])
     floor_of = {key: dict(zip(own["frame"], own["value"], strict=True)) for key, own in floors}
@@ -149,6 +174,7 @@ def _scenes(source: ReportSource, summary: Summary) -> list[dict[str, Any]]:
                 "id": str(scene),
                 "track": str(track),
                 "frames": indices,
+                "sequences": [sequences.get((str(scene), frame), "") for frame in indices],
                 "width": width,
                 "height": height,
                 "floor": {

@@ -5,12 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 from gibench.benchmarks.report.error_against_cost import COSTS, error_against
+from gibench.benchmarks.report.error_against_training import error_against_training
 from gibench.benchmarks.report.error_along_path import error_along_path
 from gibench.benchmarks.report.plot_style import STYLE, save
 from gibench.benchmarks.report.runs import image_part
 from gibench.benchmarks.report.source import ReportSource
 from gibench.benchmarks.report.stage_bars import stage_bars
 from gibench.benchmarks.report.summary import Summary
+from gibench.benchmarks.report.trainings import trainings
 
 PLOTTED = ("rmse_display", "rmse", "dssim", "lpips_alex", "lpips_vgg", "flip")
 """Metrics that get plots of their own: those of the papers' tables and FLIP. The page draws any other."""
@@ -26,6 +28,7 @@ def write_plots(source: ReportSource, summary: Summary, out: Path) -> list[Path]
 
 def _written(source: ReportSource, summary: Summary, out: Path) -> list[Path]:
     written: list[Path] = []
+    curves = trainings(source, summary)
     for track in summary.tracks:
         prefix = f"{track}-" if len(summary.tracks) > 1 else ""
         for part in (part for part in summary.parts if part == image_part(part)):
@@ -42,10 +45,13 @@ def _written(source: ReportSource, summary: Summary, out: Path) -> list[Path]:
                 if figure is not None:
                     written += save(figure, out, f"{prefix}error-along-path-{part}-{metric}")
         for order, machine in enumerate(summary.machines):
-            figure = stage_bars(source, summary, track, machine)
-            if figure is not None:
-                several = len(summary.machines) > 1
-                written += save(figure, out, f"{prefix}stages" + (f"-machine-{order + 1}" if several else ""))
+            suffix = f"-machine-{order + 1}" if len(summary.machines) > 1 else ""
+            for name, figure in (
+                ("stages", stage_bars(source, summary, track, machine)),
+                ("training-curves", error_against_training(curves, summary, track, machine)),
+            ):
+                if figure is not None:
+                    written += save(figure, out, f"{prefix}{name}{suffix}")
     return written
 
 

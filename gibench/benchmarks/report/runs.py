@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from gibench.benchmarks.report.source import PARTS, ReportError
 from gibench.benchmarks.results import WHOLE_PATH, Results
+from gibench.benchmarks.scenes import STILLS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -101,6 +102,23 @@ class Runs:
     def curves(self) -> pd.DataFrame:
         """As `Results.curves`."""
         return self._joined("curves").drop_duplicates(ignore_index=True)
+
+    @cached_property
+    def paths(self) -> pd.DataFrame:
+        """Scene, frame, and the sequence that the frame lies in: "" for a still."""
+        import pandas as pd
+
+        found: dict[tuple[str, int], str] = {}
+        for number, run in enumerate(self._runs):
+            for record in run.records():
+                scene = self._names[number, str(record["config"]["scene"])]
+                # Before frames had tags, a scene had one path and nothing else.
+                tags = record.get("tags") or [["path"]] * len(record.get("frames", []))
+                for frame, own in enumerate(tags):
+                    found[scene, frame] = "" if own[0] == STILLS else str(own[0])
+        rows = [(*where, sequence) for where, sequence in sorted(found.items())]
+        columns = {"scene": "str", "frame": "int64", "sequence": "str"}
+        return pd.DataFrame(rows, columns=list(columns)).astype(columns)
 
     @cached_property
     def frames(self) -> pd.DataFrame:

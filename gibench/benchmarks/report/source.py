@@ -31,7 +31,8 @@ class ReportSource(Protocol):
     run: track, preset, seed, machine (a mapping), created. results: a row a result, that is (scene, method, knobs,
     seed). stages: milliseconds per frame by result and stage. frames: metric values by result, frame and part.
     sequences: values of metrics in time by result and part. floor: what each metric says of a second,
-    independent reference, by scene, frame and part.
+    independent reference, by scene, frame and part. curves: looks at the held-out error of trainings, a row a look.
+    paths: which frames of a scene follow each other.
     """
 
     @property
@@ -61,6 +62,14 @@ class ReportSource(Protocol):
     @property
     def floor(self) -> pd.DataFrame:
         """Columns scene, frame, metric, part, value."""
+
+    @property
+    def curves(self) -> pd.DataFrame:
+        """Columns result, training, step, seconds, error."""
+
+    @property
+    def paths(self) -> pd.DataFrame:
+        """Columns scene, frame, sequence: the name of the sequence that the frame lies in, "" for a still."""
 
     def prediction(self, result: str, frame: int, part: str) -> NDArray[np.float32]:
         """What a method said, (H, W, 3), linear radiance."""

@@ -37,6 +37,7 @@ class Summary:
     the chosen setting on the frames that both have, and verdict: what may be said of that difference
     (`gibench.benchmarks.statistics.verdict`).
     floor: values of the reference's floor by scene, frame, part and metric, frame -1 for metrics in time.
+    paths: the sequence of each scene and frame, "" for a still.
     against: the label that differences are taken against, None for none.
     """
 
@@ -45,6 +46,7 @@ class Summary:
     values: pd.DataFrame
     scores: pd.DataFrame
     floor: pd.DataFrame
+    paths: pd.DataFrame
     against: str | None
 
     @property
@@ -97,7 +99,7 @@ def summarise(source: ReportSource, *, against: str | None = None) -> Summary:
     floor = by_frame.mean().reset_index()
     entries = _entries(results)
     scores = pd.DataFrame(_scores(entries, by_seed, floor, chosen), columns=_SCORE_COLUMNS)
-    return Summary(entries, results, values, scores, floor, chosen)
+    return Summary(entries, results, values, scores, floor, source.paths, chosen)
 
 
 def machine_names(run: Mapping[str, Any], ids: Sequence[str]) -> dict[str, str]:

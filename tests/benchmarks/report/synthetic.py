@@ -71,6 +71,8 @@ class SyntheticRun:
     """What `write_report` takes, made up.
 
     failed: labels whose result of the last scene failed. machines: each has its own results of every setting.
+    looks: at the held-out error of a training; networks train, for each room and seed. seeds: of every setting.
+    stills: how many frames, from the first on, are in no sequence.
     """
 
     def __init__(
@@ -86,6 +88,9 @@ class SyntheticRun:
         machines=("cpu-a",),
         measured=True,
         parts=("full", "specular"),
+        looks=12,
+        seeds=(1,),
+        stills=0,
     ):
         self.root = Path(root)
         self.settings = settings() if chosen is None else chosen
@@ -94,6 +99,7 @@ class SyntheticRun:
         self.width, self.height = size
         self.metrics, self.failed, self.machines = metrics, failed, machines
         self.measured, self.parts = measured, parts
+        self.looks, self.seeds, self.stills = looks, seeds, stills
         self.read = []
         self.run = {
             "track": "walkthrough",
@@ -113,17 +119,18 @@ class SyntheticRun:
         for machine in self.machines:
             for setting in self.settings:
                 for scene in self.scenes:
-                    key = f"{machine}/{setting.label}/{scene}"
-                    yield hashlib.sha256(key.encode()).hexdigest()[:16], machine, setting, scene
+                    for seed in self.seeds:
+                        key = f"{machine}/{setting.label}/{scene}" + (f"/{seed}" if seed != 1 else "")
+                        yield hashlib.sha256(key.encode()).hexdigest()[:16], machine, setting, scene, seed
 
     @cached_property
     def of(self):
-        return {result: (setting, scene) for result, _, setting, scene in self.who()}
+        return {result: (setting, scene) for result, _, setting, scene, _ in self.who()}
 
     @cached_property
     def results(self):
         rows = []
-        for result, machine, setting, scene in self.who():
+        for result, machine, setting, scene, seed in self.who():
             broken = setting.label in self.failed and scene == self.scenes[-1]
             wobble = 1 + 0.1 * self.scenes.index(scene)
             parts = dict(
@@ -144,7 +151,7 @@ class SyntheticRun:
                     "family": setting.kind,
                     "label": setting.label,
                     "knobs": json.dumps(setting.knobs),
-                    "seed": 1,
+                    "seed": seed,
                     "status": "failed" if broken else "ok",
                     "reason": "Traceback (most recent call last):\n  File\nMemoryError: <b>no</b> room"
                     if broken
@@ -211,6 +218,32 @@ class SyntheticRun:
             if part == "full" or self.of[row.result][0].specular
         ]
         return pd.DataFrame(rows, columns=["result", "sequence", "metric", "part", "value"])
+
+    @cached_property
+    def curves(self):
+        rows = []
+        for number, row in enumerate(self.done):
+            setting, scene = self.of[row.result]
+            if setting.kind != "network":
+                continue
+            rng = np.random.default_rng([number, self.looks])
+            level, seconds = setting.blur * (1 + 0.3 * self.scenes.index(scene)), 0.05
+            for look in range(self.looks):
+                error = (
+                    level * (0.1 + 0.9 * np.exp(-5 * look / max(1, self.looks - 1))) * rng.uniform(0.95, 1.05)
+                )
+                rows.append((row.result, 0, 100 * look, seconds, error))
+                seconds += row.prepare_training_s / self.looks * rng.uniform(0.9, 1.1)
+        return pd.DataFrame(rows, columns=["result", "training", "step", "seconds", "error"])
+
+    @cached_property
+    def paths(self):
+        rows = [
+            (scene, frame, "" if frame < self.stills else "walk")
+            for scene in self.scenes
+            for frame in self.indices
+        ]
+        return pd.DataFrame(rows, columns=["scene", "frame", "sequence"])
 
     @cached_property
     def floor(self):

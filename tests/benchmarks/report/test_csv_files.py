@@ -13,7 +13,8 @@ def tables(run, summary, tmp_path_factory):
 
 
 def test_every_file_names_the_method_and_setting(tables):
-    assert set(tables) == {"leaderboard.csv", "frames.csv", "sequences.csv", "stages.csv", "results.csv"}
+    names = ("leaderboard", "frames", "sequences", "stages", "training", "results")
+    assert set(tables) == {f"{name}.csv" for name in names}
     for table in tables.values():
         assert {"method", "label", "knobs", "machine"} <= set(table.columns)
 
@@ -36,6 +37,24 @@ def test_frames_carry_every_value_and_the_noise_floor(run, tables):
     assert len(both) == len(run.frames)
     assert both["value"].to_numpy() == pytest.approx(both["value_raw"].to_numpy(), rel=1e-6)
     assert (frames.loc[frames["metric"] == "rmse", "noise_floor"] == 0.004).all()
+
+
+def test_training_carries_every_look(tables, tmp_path):
+    from gibench.benchmarks.report.summary import summarise
+    from tests.benchmarks.report.synthetic import Setting, SyntheticRun
+
+    assert tables["training.csv"].empty
+    run = SyntheticRun(tmp_path, chosen=[Setting("gpr", kind="network")], scenes=2, frames=1, measured=False)
+    run.curves.loc[3, "error"] = math.nan
+    write_csv_files(run, summarise(run), tmp_path)
+    table = pd.read_csv(tmp_path / "training.csv")
+    assert list(table.columns[-4:]) == ["training", "step", "seconds", "error"]
+    assert set(table["method"]) == {"gpr"}
+    both = table.merge(run.curves, on=["result", "training", "step"], suffixes=("", "_raw"))
+    assert len(both) == len(table) == len(run.curves) == 2 * run.looks
+    for name in ("seconds", "error"):
+        assert both[name].to_numpy() == pytest.approx(both[f"{name}_raw"].to_numpy(), rel=1e-6, nan_ok=True)
+    assert table["error"].isna().sum() == 1
 
 
 def test_failed_results_are_listed_with_their_reason(tables):

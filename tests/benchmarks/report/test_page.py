@@ -6,7 +6,7 @@ import re
 from gibench.benchmarks.report import write_report
 from gibench.benchmarks.report.page import page_data, write_page
 from gibench.benchmarks.report.summary import summarise
-from tests.benchmarks.report.synthetic import SyntheticRun
+from tests.benchmarks.report.synthetic import Setting, SyntheticRun
 
 
 def data_in(path):
@@ -71,6 +71,25 @@ def test_gaps_in_the_frames_are_gaps_in_the_series(run):
     shown = next(result for result in data["results"] if result["id"] == first)["series"]["full/rmse"]
     assert shown[1] is None
     assert shown[0] is not None
+
+
+def test_trainings_keep_their_ends_and_their_best_look(run, tmp_path):
+    assert page_data(run, summarise(run))["trainings"] == []
+    trained = SyntheticRun(tmp_path, chosen=[Setting("a", kind="network")], scenes=1, frames=1, looks=700)
+    trained.curves.loc[501, "error"] = 1e-3
+    trained.curves.loc[0, "error"] = float("nan")
+    (shown,) = page_data(trained, summarise(trained))["trainings"]
+    assert len(shown["steps"]) == len(shown["seconds"]) == len(shown["errors"]) in (100, 101)
+    assert (shown["steps"][0], shown["steps"][-1], shown["steps"][shown["best"]]) == (0, 69900, 50100)
+    assert (shown["errors"][0], shown["errors"][shown["best"]]) == (None, 1e-3)
+    assert (shown["scenes"], shown["seed"], shown["family"]) == (("room-000000",), 1, "a")
+    json.dumps(shown, allow_nan=False)
+
+
+def test_the_page_knows_stills_from_sequences(run, tmp_path):
+    stills = SyntheticRun(tmp_path, scenes=1, frames=3, stills=2, measured=False)
+    (scene,) = page_data(stills, summarise(stills))["scenes"]
+    assert scene["sequences"] == ["", "", "walk"]
 
 
 def test_metrics_stand_as_the_track_lists_them_and_others_after_them(run, tmp_path):

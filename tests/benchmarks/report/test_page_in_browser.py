@@ -8,9 +8,12 @@ import time
 import numpy as np
 import pytest
 
-from gibench.benchmarks.report.image_files import decode, encode, image_name
+from gibench.benchmarks.report.image_files import decode, encode, image_name, write_images
+from gibench.benchmarks.report.page import write_page
+from gibench.benchmarks.report.summary import summarise
 from gibench.metrics import flip, tone_map
 from gibench.metrics.tone_map import srgb_from_linear
+from tests.benchmarks.report.synthetic import Setting, SyntheticRun
 
 PIXELS = (
     """canvas => Array.from(canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data)"""
@@ -376,6 +379,62 @@ def test_plots_have_names_that_do_not_lie_on_each_other(opened, width):
             assert any(text.startswith("noise floor") for text in texts)
     page.select_option("#metric", "warping_error")
     assert "whole path" in page.locator("#along").inner_text()
+
+
+@pytest.fixture(scope="module")
+def trained_file(tmp_path_factory):
+    """The page of a run with networks, stills, and a training whose errors were not finite at its end."""
+    out = tmp_path_factory.mktemp("trained")
+    chosen = [
+        Setting(name, kind="network", blur=blur) for name, blur in (("a", 2), ("a:plain", 1), ("b", 30))
+    ]
+    chosen.append(Setting("rtrt", kind="lightmap"))
+    run = SyntheticRun(out, chosen=chosen, frames=5, stills=2, scenes=2, seeds=(1, 2), measured=False)
+    first = run.curves["result"].iloc[0]
+    run.curves.loc[(run.curves["result"] == first) & (run.curves["step"] > 700), "error"] = np.nan
+    summary = summarise(run)
+    write_images(run, summary.results, out)
+    return write_page(run, summary, out)
+
+
+@pytest.mark.parametrize("width", [1280, 360])
+def test_trainings_are_drawn_a_panel_a_method(opened, trained_file, width):
+    page = opened(width)
+    assert page.locator("#training").is_hidden()  # nothing was trained there
+    page.goto(trained_file.as_uri())
+    assert page.locator("#training").is_visible()
+    panels = page.locator("#training-charts svg")
+    captions = page.locator("#training-charts figcaption").all_inner_texts()
+    assert [text.split(":")[0] for text in captions] == ["a, 8 trainings", "b, 4 trainings"]
+    assert all("its own measure" in text for text in captions)
+    assert "never between panels" in page.locator("#training-note").inner_text()
+    crosses = "path[d*='l6 6m0 -6l-6 6']"
+    for against, words in (
+        ("seconds", "seconds of training, looks included"),
+        ("steps", "steps of training"),
+    ):
+        page.locator(f'[name=training-against][value="{against}"]').check()
+        for panel in range(2):
+            assert overlapping(page, f"#training-charts figure:nth-child({panel + 1}) svg") == []
+            assert words in panels.nth(panel).locator("text").all_text_contents()
+        assert panels.nth(0).locator("path[fill=none][stroke-opacity]").count() == 8
+        assert [panels.nth(panel).locator(crosses).count() for panel in range(2)] == [4, 0]
+        assert {"a", "a:plain", "0"} <= set(panels.nth(0).locator("text").all_text_contents())
+    page.select_option("#scene", "room-000000")
+    assert panels.nth(0).locator("path[fill=none][stroke-opacity]").count() == 4
+    assert page.evaluate("document.documentElement.scrollWidth") == width
+
+
+def test_no_line_runs_through_stills(opened, trained_file):
+    page = opened()
+    page.goto(trained_file.as_uri())
+    paths = page.locator("#along svg path[stroke-width='1.5']").evaluate_all(
+        "all => all.map((p) => p.getAttribute('d'))"
+    )
+    assert len(paths) == 4
+    for path in paths:
+        # Two stills, each by itself, then a sequence of three frames.
+        assert re.sub(r"[^ML]", "", path) == "MMMLL"
 
 
 def test_a_click_in_the_path_plot_goes_to_that_frame(opened):

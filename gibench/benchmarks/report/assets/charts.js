@@ -227,7 +227,7 @@ function showAlong() {
   const x = axis(first - 0.5, last + 0.5, LEFT, width - right, false);
   x.ticks = x.ticks.filter((tick) => Number.isInteger(tick));
   const noise = noiseFloor(svg, y, floor, chosen.higher, width, height, right);
-  frameOf(svg, x, y, width, height, right, "frame of the path", `${chosen.title}, ${chosen.higher ? "higher" : "lower"} is better`);
+  frameOf(svg, x, y, width, height, right, scene.sequences.every(Boolean) ? "frame of the path" : "frame; a still is a point", `${chosen.title}, ${chosen.higher ? "higher" : "lower"} is better`);
   const here = draw("line", { id: "along-here", y1: TOP, y2: height - BOTTOM, stroke: "var(--ink)", "stroke-width": 1.2 });
   svg.append(here);
   const ends = [];
@@ -237,9 +237,11 @@ function showAlong() {
     values.forEach((value, at) => {
       if (!finite(value)) return;
       const spot = [x.at(scene.frames[at]), y.at(value)];
-      path += `${path && finite(values[at - 1]) ? "L" : "M"}${spot[0].toFixed(1)} ${spot[1].toFixed(1)}`;
+      const still = scene.sequences[at] === "";
+      const follows = !still && at > 0 && finite(values[at - 1]) && scene.sequences[at] === scene.sequences[at - 1];
+      path += `${follows ? "L" : "M"}${spot[0].toFixed(1)} ${spot[1].toFixed(1)}`;
       end = spot;
-      if (at % Math.max(1, Math.ceil(values.length / 8)) === 0) svg.append(marker(style.marker, ...spot, 3.4, { fill: style.colour }));
+      if (still || at % Math.max(1, Math.ceil(values.length / 8)) === 0) svg.append(marker(style.marker, ...spot, 3.4, { fill: style.colour }));
     });
     svg.append(draw("path", { d: path, fill: "none", stroke: style.colour, "stroke-width": 1.5, "stroke-dasharray": style.dash }));
     if (end) ends.push({ label, y: end[1], colour: style.colour });

@@ -1,5 +1,5 @@
 // The leaderboard: what a row says of a setting under the chosen track, room, part, metric and machine.
-const state = { track: data.tracks[0], scene: "", part: data.parts[0], metric: null, machine: "", sort: { key: "mean", down: false }, cost: "ms" };
+const state = { track: data.tracks[0], scene: "", part: data.parts[0], metric: null, machine: "", sort: { key: "mean", down: false }, cost: "ms", training: "seconds" };
 const severalMachines = data.machines.length > 1;
 const TIMED = ["ms", "p95", "prepare"];
 const resultsOf = new Map(data.entries.map((_, at) => [at, []]));

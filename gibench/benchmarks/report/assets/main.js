@@ -56,6 +56,7 @@ function showAll() {
 
 function showCharts() {
   showScatter();
+  showTraining();
   showAlong();
   showStages();
 }
@@ -70,10 +71,11 @@ function listen() {
   on("on-machine", "change", ({ value }) => { state.machine = value; showAll(); });
   $("filters").addEventListener("submit", (event) => event.preventDefault());
   for (const input of document.querySelectorAll('[name="cost"]')) input.addEventListener("change", () => { state.cost = input.value; showScatter(); });
+  for (const input of document.querySelectorAll('[name="training-against"]')) input.addEventListener("change", () => { state.training = input.value; showTraining(); });
 
   on("view-scene", "change", ({ value }) => {
     view.scene = Number(value);
-    if (state.scene !== "") { state.scene = data.scenes[view.scene].id; $("scene").value = state.scene; showBoard(); showScatter(); }
+    if (state.scene !== "") { state.scene = data.scenes[view.scene].id; $("scene").value = state.scene; showBoard(); showScatter(); showTraining(); }
     showViewer();
     showAlong();
   });
@@ -97,7 +99,7 @@ function listen() {
   let width = 0;
   new ResizeObserver(([{ contentRect }]) => {
     if (Math.abs(contentRect.width - width) < 1) return;
-    if (width) { showScatter(); showAlong(); }
+    if (width) { showScatter(); showTraining(); showAlong(); }
     width = contentRect.width;
   }).observe($("plots"));
 }
