@@ -62,7 +62,7 @@ def started(words: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
     program = [str(script)] if script.exists() else [sys.executable, "-c", code]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
     return subprocess.run(
-        [*program, *words[1:]], cwd=folder, env=environment, capture_output=True, text=True, timeout=300
+        [*program, *words[1:]], cwd=folder, env=environment, capture_output=True, text=True, timeout=900
     )
 
 
