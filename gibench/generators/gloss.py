@@ -9,7 +9,6 @@ import numpy as np
 from gibench.generators.materials import is_glossy
 from gibench.generators.parts import Camera, Material, RoomObject
 from gibench.generators.visibility import RayCaster
-from gibench.rendering.camera import PinholeCamera
 
 GLOSS = ("any", "much")
 """Rooms as they come, or those with polished floors and furniture."""
@@ -35,7 +34,7 @@ def visible_gloss(
     x, y = np.meshgrid((np.arange(COLUMNS) + 0.5) / COLUMNS, (np.arange(ROWS) + 0.5) / ROWS)
     origins, directions = [], []
     for camera in cameras:
-        right, down, forward = PinholeCamera(camera.position, camera.target, camera.fov).frame
+        right, down, forward = camera.pinhole.frame
         wide = np.tan(camera.fov / 2)
         across, along = wide * (2 * x - 1), wide * ROWS / COLUMNS * (2 * y - 1)
         rays = forward + across[..., None] * right + along[..., None] * down

@@ -184,12 +184,13 @@ def empty(scene: Scene, lights: Sequence[AreaLight], spacing: float) -> NDArray[
 
 def share_of_view(light: AreaLight, camera: PinholeCamera | Camera, aspect: float) -> float:
     """How much of a camera's image a light covers if nothing hides it, in [0, 1]. aspect: width over height."""
-    pinhole = PinholeCamera(camera.position, camera.target, camera.fov)
+    pinhole = camera if isinstance(camera, PinholeCamera) else camera.pinhole
     corners = (light.corners - np.asarray(camera.position)) @ pinhole.frame.T
     visible = _in_front(corners)
     if len(visible) < 3:
         return 0.0
-    flat = visible[:, :2] / visible[:, 2:] * pinhole.focal_length(2)
+    across, down = pinhole.principal_point
+    flat = visible[:, :2] / visible[:, 2:] * pinhole.focal_length(2) + [2 * across, 2 * down / aspect]
     image = shapely.box(-1.0, -1.0 / aspect, 1.0, 1.0 / aspect)
     return float(shapely.MultiPoint(flat).convex_hull.intersection(image).area / image.area)
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.lighting import Lighting
 
 FloatArray = NDArray[np.float64]
@@ -150,13 +151,38 @@ class RoomObject:
 
 @dataclass(frozen=True)
 class Camera:
-    """A pinhole camera. position and target in metres, horizontal field of view in radians."""
+    """A pinhole camera. position and target in metres, horizontal field of view in radians.
+
+    up, principal_point, mirrored: as those of a `PinholeCamera`; a room that is generated has none.
+    """
 
     position: tuple[float, float, float]
     target: tuple[float, float, float]
     fov: float
     path: str = ""  # the name of the walk that it belongs to, empty for a still
     step: int = 0  # its place on that walk
+    up: tuple[float, float, float] | None = None
+    principal_point: tuple[float, float] = (0.0, 0.0)
+    mirrored: bool = False
+
+    @property
+    def pinhole(self) -> PinholeCamera:
+        """What renders it."""
+        return PinholeCamera(
+            self.position, self.target, self.fov, self.up, self.principal_point, self.mirrored
+        )
+
+    @property
+    def peculiarities(self) -> dict[str, Any]:
+        """`up`, `principal_point` and `mirrored`, each only where it is not that of an ordinary camera; JSON-able."""
+        found: dict[str, Any] = {}
+        if self.up is not None:
+            found["up"] = list(self.up)
+        if any(self.principal_point):
+            found["principal_point"] = list(self.principal_point)
+        if self.mirrored:
+            found["mirrored"] = True
+        return found
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,6 @@ from gibench.generators.materials import bsdf_xml, tile_size
 from gibench.generators.outside import GROUND, ground_element
 from gibench.generators.panorama import write_panorama
 from gibench.generators.parts import Camera, Environment, FloatArray, Light, Mesh, Room, Texture
-from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.lighting import Lighting
 from gibench.rendering.scene import OPENINGS
 
@@ -152,8 +151,14 @@ def sensor_element(camera: Camera, name: str, resolution: tuple[int, int], spp: 
     SubElement(sensor, "string", name="fov_axis", value="x")
     SubElement(sensor, "float", name="fov", value=_number(np.degrees(camera.fov)))
     SubElement(sensor, "float", name="near_clip", value="0.01")
+    for axis, share in zip("xy", camera.principal_point, strict=True):
+        if share:
+            # Mitsuba counts from the principal point to the middle of the film.
+            SubElement(sensor, "float", name=f"principal_point_offset_{axis}", value=_number(-share))
     transform = SubElement(sensor, "transform", name="to_world")
-    up = PinholeCamera(camera.position, camera.target, camera.fov).up
+    if camera.mirrored:
+        SubElement(transform, "scale", x="-1", y="1", z="1")
+    up = camera.pinhole.look_at_up
     places = {"origin": camera.position, "target": camera.target, "up": up}
     SubElement(transform, "lookat", {name: ", ".join(map(_number, p)) for name, p in places.items()})
     film = SubElement(sensor, "film", type="hdrfilm")
@@ -248,6 +253,7 @@ def camera_records(cameras: Sequence[Camera]) -> list[dict[str, Any]]:
             "fov": float(camera.fov),
             "path": camera.path,
             "step": int(camera.step),
+            **camera.peculiarities,
         }
         for camera in cameras
     ]

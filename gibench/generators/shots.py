@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Protocol, TypeVar
 import numpy as np
 
 from gibench.generators.parts import Camera, Room
-from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.lighting import EnvironmentMap, Lighting, Shot
 from gibench.rendering.panoramas import Panorama
 
@@ -121,7 +120,7 @@ def shot_of(room: Room | ImportedRoom, view: int) -> Shot:
     """What a frame of a room is made from."""
     camera = room.cameras[view]
     lighting = room.lightings[view] if room.lightings else Lighting()
-    return Shot(PinholeCamera(camera.position, camera.target, camera.fov), lighting)
+    return Shot(camera.pinhole, lighting)
 
 
 def shot_before(room: Room | ImportedRoom, view: int) -> Shot | None:

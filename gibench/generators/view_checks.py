@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from gibench.generators.parts import Camera, FloatArray
 from gibench.generators.visibility import Caster
-from gibench.rendering.camera import PinholeCamera
 
 GRID = (24, 18)  # rays across and down, at the aspect of the usual 4:3 frame
 
@@ -34,7 +33,7 @@ class View:
 
 def camera_rays(cameras: Sequence[Camera], grid: tuple[int, int] = GRID) -> FloatArray:
     """(cameras, columns · rows, 3) unit directions through a grid over each view, row by row from the top."""
-    frames = np.array([PinholeCamera(c.position, c.target, c.fov).frame for c in cameras])
+    frames = np.array([c.pinhole.frame for c in cameras])
     right, down, forward = frames[:, 0], frames[:, 1], frames[:, 2]
     columns, rows = grid
     reach = np.tan(np.array([camera.fov for camera in cameras]) / 2)[:, None]

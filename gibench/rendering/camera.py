@@ -14,6 +14,9 @@ from gibench.rendering.backend import is_scalar
 NEAREST_TARGET = 1e-9
 """Metres: a target that is no farther away gives no direction."""
 
+ALONG = 1e-7
+"""Sine of the angle between the view and up below which they count as parallel."""
+
 
 class CameraError(GibenchError, ValueError):
     """A camera that sees nothing, or a resolution that is none."""
@@ -21,20 +24,28 @@ class CameraError(GibenchError, ValueError):
 
 @dataclass(frozen=True)
 class PinholeCamera:
-    """A pinhole camera with Z up.
+    """A pinhole camera, with Z up unless it says otherwise.
 
-    position, target: world space, metres, not equal. fov: horizontal field of view, radians, in (0, π).
+    position, target: world space, metres, not equal. fov: horizontal field of view, radians, in (0, π): of an image
+    that is centred, so that a shifted centre changes no distance in pixels. up: world space, of any length and not
+    along the view; the top of the image is what of it is at right angles to the view. principal_point: where the
+    optical axis meets the image, from its middle to the right and down, as shares of its width and height. mirrored:
+    whether left and right of the image are exchanged.
     """
 
     position: tuple[float, float, float]
     target: tuple[float, float, float]
     fov: float
+    up: tuple[float, float, float] | None = None
+    principal_point: tuple[float, float] = (0.0, 0.0)
+    mirrored: bool = False
 
     def __post_init__(self) -> None:
         """Raises CameraError for what is no camera. Numbers of NumPy become Python's, which alone Mitsuba takes."""
-        for name in ("position", "target"):
+        for name in ("position", "target", "principal_point", *(["up"] if self.up is not None else [])):
             object.__setattr__(self, name, tuple(float(c) for c in getattr(self, name)))
         object.__setattr__(self, "fov", float(self.fov))
+        object.__setattr__(self, "mirrored", bool(self.mirrored))
         finite = np.isfinite([*self.position, *self.target, self.fov]).all()
         apart = np.linalg.norm(np.subtract(self.target, self.position)) > NEAREST_TARGET if finite else False
         if not (apart and 0 < self.fov < np.pi):
@@ -42,29 +53,57 @@ class PinholeCamera:
                 f"camera at {self.position} towards {self.target} with a field of view of {self.fov} rad: position "
                 "and target must be finite and apart, the field of view between 0 and pi"
             )
+        if len(self.principal_point) != 2 or not np.isfinite(self.principal_point).all():
+            raise CameraError(
+                f"camera at {self.position}: its principal point {self.principal_point} is none"
+            )
+        if self.up is not None and not self._stands():
+            raise CameraError(
+                f"camera at {self.position} towards {self.target}: up {self.up} must be finite and not along the view"
+            )
+
+    def _stands(self) -> bool:
+        """Whether `up` is a direction that is not along the view."""
+        up = np.array(self.up)
+        if up.shape != (3,) or not np.isfinite(up).all() or not (largest := np.abs(up).max()) > 0:
+            return False
+        forward = np.subtract(self.target, self.position)
+        up = up / largest
+        sine = np.linalg.norm(np.cross(forward / np.linalg.norm(forward), up / np.linalg.norm(up)))
+        return bool(sine > ALONG)
 
     @property
     def frame(self) -> NDArray[np.float64]:
         """(3, 3): unit right, down and forward in world space, by row; what pixel x, pixel y and depth grow along.
 
-        A camera that looks exactly along Z has no horizon: its right is then world x.
+        Its determinant is 1, and −1 where the camera is mirrored. A camera that looks exactly along Z and has no up of
+        its own has no horizon: its right is then world x.
         """
         forward = np.subtract(self.target, self.position).astype(np.float64)
         forward /= np.linalg.norm(forward)
-        right = np.cross(forward, [0.0, 0.0, 1.0])
+        up = np.array([0.0, 0.0, 1.0] if self.up is None else self.up)
+        right = np.cross(forward, up / np.abs(up).max())
         length = np.linalg.norm(right)
-        right = right / length if length > 1e-7 else np.array([1.0, 0.0, 0.0])
-        return np.array([right, np.cross(forward, right), forward])
+        right = right / length if self.up is not None or length > ALONG else np.array([1.0, 0.0, 0.0])
+        return np.array([-right if self.mirrored else right, np.cross(forward, right), forward])
 
     @property
-    def up(self) -> tuple[float, float, float]:
-        """What a look-at transform takes as up: Z, or the top of the image where the view is along Z or next to it."""
+    def look_at_up(self) -> tuple[float, float, float]:
+        """What a look-at transform takes as up: Z, or the top of the image where that is not as good as the same.
+
+        A mirror image is not in it.
+        """
         x, y, z = -self.frame[1]
-        return (0.0, 0.0, 1.0) if z > 1e-3 else (float(x), float(y), float(z))
+        return (0.0, 0.0, 1.0) if self.up is None and z > 1e-3 else (float(x), float(y), float(z))
 
     def focal_length(self, width: int) -> float:
         """In pixels."""
         return 0.5 * width / float(np.tan(0.5 * self.fov))
+
+    def centre(self, resolution: tuple[int, int]) -> tuple[float, float]:
+        """Where the optical axis meets an image of (width, height): x and y in pixels from its upper left corner."""
+        (width, height), (x, y) = resolution, self.principal_point
+        return 0.5 * width + x * width, 0.5 * height + y * height
 
     def project(
         self, points: NDArray[np.floating], resolution: tuple[int, int]
@@ -78,10 +117,10 @@ class PinholeCamera:
         >>> x.tolist(), y.tolist(), depth.tolist()
         ([32.0, 48.0], [24.0, 24.0], [2.0, 2.0])
         """
-        width, height = resolution
-        focal = self.focal_length(width)
+        focal = self.focal_length(resolution[0])
+        across, down = self.centre(resolution)
         x, y, depth = np.moveaxis((points - np.array(self.position)) @ self.frame.T, -1, 0)
-        return x / depth * focal + 0.5 * width, y / depth * focal + 0.5 * height, depth
+        return x / depth * focal + across, y / depth * focal + down, depth
 
 
 def check_resolution(resolution: tuple[int, int]) -> tuple[int, int]:
@@ -98,7 +137,7 @@ class RayGenerator:
     """Rays of a camera, with its numbers kept out of the compiled kernel, so that one kernel serves all frames.
 
     origin: mi.Point3f, m. axes: unit mi.Vector3f, as `PinholeCamera.frame`. scale: mi.Float, size of a pixel over its
-    depth. centre: mi.Vector2f of the film, pixels.
+    depth. centre: mi.Vector2f, where the optical axis meets the film, pixels.
     """
 
     def __init__(self, camera: PinholeCamera, resolution: tuple[int, int]) -> None:
@@ -106,12 +145,12 @@ class RayGenerator:
         import drjit as dr
         import mitsuba as mi
 
-        width, height = check_resolution(resolution)
-        focal = camera.focal_length(width)
+        resolution = check_resolution(resolution)
+        focal = camera.focal_length(resolution[0])
         self.origin = mi.Point3f(list(camera.position))
         self.axes = [mi.Vector3f(row.tolist()) for row in camera.frame]
         self.scale = mi.Float(1 / focal)
-        self.centre = mi.Vector2f(0.5 * width, 0.5 * height)
+        self.centre = mi.Vector2f(*camera.centre(resolution))
         if not is_scalar():
             dr.make_opaque(self.origin, self.axes, self.scale, self.centre)
 

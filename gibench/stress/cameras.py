@@ -25,7 +25,8 @@ PLANE = "the plane, in float64; 8 roundings of float32"
 def distances_to_plane(camera: PinholeCamera, resolution: tuple[int, int], axis: int, at: float) -> Any:
     """(H, W) distances along the rays through pixel centres to the plane where coordinate `axis` is `at`, metres."""
     width, height = resolution
-    x, y = np.meshgrid(np.arange(width) + 0.5 - width / 2, np.arange(height) + 0.5 - height / 2)
+    centre_x, centre_y = camera.centre(resolution)
+    x, y = np.meshgrid(np.arange(width) + 0.5 - centre_x, np.arange(height) + 0.5 - centre_y)
     focal = camera.focal_length(width)
     rays = np.stack([x / focal, y / focal, np.ones_like(x)], axis=-1) @ camera.frame
     rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
@@ -109,7 +110,7 @@ def along_z(sign: str) -> Found:
     error = float(np.abs(2 * towards / rays[..., 2] / answer - 1).max())
     yield Check("checks", "rays of the view check", error, 1e-12, "float64")
     place = mi.ScalarTransform4f().look_at(
-        origin=list(camera.position), target=list(camera.target), up=list(camera.up)
+        origin=list(camera.position), target=list(camera.target), up=list(camera.look_at_up)
     )
     axes = np.array(place.matrix, dtype=np.float64)[:3, :3].T * [
         [-1],

@@ -62,7 +62,7 @@ def render_path(
         "component_format": "float32",
     }
     place = mi.ScalarTransform4f().look_at(
-        origin=list(camera.position), target=list(camera.target), up=list(camera.up)
+        origin=list(camera.position), target=list(camera.target), up=list(camera.look_at_up)
     )
     sensor = mi.load_dict(
         {

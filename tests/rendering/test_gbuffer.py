@@ -181,6 +181,24 @@ def test_motion_of_a_hand_computed_pixel():
     np.testing.assert_array_equal(frame["motion_valid"][:, -1, 0], 0)
 
 
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_positions_and_motion_of_a_rolled_off_centre_camera_are_those_of_its_projection(mirrored):
+    wall = scenes.rectangle([0, 3, 0], [0, -1, 0], (40, 40))
+    odd = {"up": (0.4, 0.1, 1), "principal_point": (0.2, -0.3), "mirrored": mirrored}
+    now = PinholeCamera((0.1, 0, 0), (0.3, 1, 0.1), 1.1, **odd)
+    before = PinholeCamera((0, 0.1, 0.05), (0.25, 1, 0.1), 1.0, **odd | {"up": (0.3, 0, 1)})
+    size = (40, 30)
+    channels = ["surface", "motion"]
+    frame = gbuffer({"type": "scene", "wall": wall}, now, size, channels, previous_camera=before)
+    centres = np.stack(np.meshgrid(np.arange(40) + 0.5, np.arange(30) + 0.5), axis=-1)
+    position = frame["position"].astype(np.float64)
+    x, y, depth = now.project(position, size)
+    np.testing.assert_allclose(np.stack([x, y], -1), centres, atol=1e-3)
+    np.testing.assert_allclose(frame["depth"][..., 0], depth, rtol=1e-5)
+    x, y, _ = before.project(position, size)
+    np.testing.assert_allclose(frame["motion"], np.stack([x, y], -1) - centres, atol=2e-3)
+
+
 def test_motion_is_not_valid_where_the_point_was_hidden():
     wall = scenes.rectangle([0, 4, 0], [0, -1, 0], (20, 20))
     screen = scenes.rectangle([0, 1, 0], [0, -1, 0], (0.3, 0.3), bsdf=scenes.two_sided(type="diffuse"))

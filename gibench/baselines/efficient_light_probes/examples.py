@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -50,14 +50,6 @@ class Example:
     valid: Tensor
 
 
-def camera_of(frame: Frame) -> PinholeCamera:
-    """The camera of a stored frame."""
-    position, target = (
-        tuple(float(frame.row[f"{what}_{axis}"]) for axis in "xyz") for what in ("camera", "target")
-    )
-    return PinholeCamera(position, target, float(frame.row["fov"]))  # type: ignore[arg-type]
-
-
 def cameras_before(
     camera: PinholeCamera, depth: float, count: int, rng: np.random.Generator
 ) -> list[PinholeCamera]:
@@ -72,12 +64,18 @@ def cameras_before(
     forward = np.asarray(camera.target) - position
     found = []
     for k in range(1, count + 1):
-        sine, cosine = math.sin(k * turn), math.cos(k * turn)
-        x, y, z = forward
         place = position - k * way
-        towards = place + np.array([cosine * x - sine * y, sine * x + cosine * y, z])
-        found.append(PinholeCamera(tuple(place), tuple(towards), camera.fov))
+        up = None if camera.up is None else tuple(_turned(np.array(camera.up), k * turn))
+        target = tuple(place + _turned(forward, k * turn))
+        found.append(replace(camera, position=tuple(place), target=target, up=up))
     return found
+
+
+def _turned(vector: NDArray[np.float64], angle: float) -> NDArray[np.float64]:
+    """A vector (3,) about Z, radians."""
+    sine, cosine = math.sin(angle), math.cos(angle)
+    x, y, z = vector
+    return np.array([cosine * x - sine * y, sine * x + cosine * y, z])
 
 
 def examples(
@@ -108,7 +106,7 @@ def _example(
     truth = _tensor(frame["color"])
     height, width = truth.shape[1:]
     resolution = (width, height)
-    camera = camera_of(frame)
+    camera = frame.camera
 
     def seen(one: PinholeCamera) -> tuple[Tensor, Tensor]:
         color, guides, _ = inputs(one, resolution, Stages())

@@ -95,12 +95,13 @@ class Screen:
         )
         result = mi.Float(1)
         # Distances to the four planes through the eye and the sides of the screen, and how fast they change.
-        for half, at, move in (
-            (0.5 * mi.Float(self.width) * camera.scale, right, move_right),
-            (0.5 * mi.Float(self.height) * camera.scale, down, move_down),
+        for size, before, at, move in (
+            (mi.Float(self.width), camera.centre.x, right, move_right),
+            (mi.Float(self.height), camera.centre.y, down, move_down),
         ):
-            for side in (-1.0, 1.0):
-                left, change = half * depth + side * at, half * move_depth + side * move
+            for side, pixels in ((-1.0, size - before), (1.0, before)):
+                reach = pixels * camera.scale
+                left, change = reach * depth + side * at, reach * move_depth + side * move
                 share = WITHIN * dr.maximum(left, 0) / dr.select(change < 0, -change, 1)
                 result = dr.select(change < 0, dr.minimum(result, share), result)
         return result

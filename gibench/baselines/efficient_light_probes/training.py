@@ -18,7 +18,7 @@ import torch
 from torch import Tensor
 
 from gibench.baselines.efficient_light_probes import losses
-from gibench.baselines.efficient_light_probes.examples import Example, camera_of
+from gibench.baselines.efficient_light_probes.examples import Example
 from gibench.baselines.efficient_light_probes.network import ReconstructionNetwork, Scale
 from gibench.baselines.method import MethodError, Setting, Site
 from gibench.baselines.sources import digest
@@ -101,7 +101,7 @@ def trained_network(
     # Read even where the network is there: whoever uses it pays for the views that it learned from.
     views = hashlib.sha256()
     for frame in site.training:
-        views.update(repr(camera_of(frame)).encode() + frame["color"].tobytes())
+        views.update(repr(frame.camera).encode() + frame["color"].tobytes())
     key = {
         **settings,
         **asdict(plan),
