@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gibench import gate
+from gibench.datasets.cameras import camera_of
 from gibench.datasets.errors import DatasetError, nearest
 from gibench.datasets.exr import decode, present_channels
 from gibench.datasets.folder import TABLE, room_folder, whole_rooms
@@ -59,11 +60,7 @@ class Frame:
     @property
     def camera(self) -> PinholeCamera:
         """Its camera, world space in metres, Z up."""
-        position, target = (
-            (float(self.row[f"{what}_x"]), float(self.row[f"{what}_y"]), float(self.row[f"{what}_z"]))
-            for what in ("camera", "target")
-        )
-        return PinholeCamera(position, target, float(self.row["fov"]))
+        return camera_of(self.row)
 
     @property
     def lighting(self) -> Lighting:
@@ -77,10 +74,11 @@ class Frame:
 
     @property
     def camera_to_world(self) -> NDArray[np.float64]:
-        """(4, 4) rigid transform from camera space to world space, metres, in OpenCV's convention.
+        """(4, 4) transform from camera space to world space, metres, in OpenCV's convention.
 
         Camera space has x to the right of the image, y down and z forward; the last column is the position. OpenGL's
-        convention, which NeRF tools take, has the second and third column negated.
+        convention, which NeRF tools take, has the second and third column negated. It is rigid, with a determinant of
+        1; that of a mirrored camera is −1.
         """
         camera, matrix = self.camera, np.eye(4)
         matrix[:3, :3] = camera.frame.T
@@ -94,8 +92,9 @@ class Frame:
         The outer corner of the first pixel is (0, 0), its centre (0.5, 0.5).
         """
         width, height = int(self.row["width"]), int(self.row["height"])
-        focal = self.camera.focal_length(width)
-        return np.array([[focal, 0, width / 2], [0, focal, height / 2], [0, 0, 1]])
+        camera = self.camera
+        focal, (x, y) = camera.focal_length(width), camera.centre((width, height))
+        return np.array([[focal, 0, x], [0, focal, y], [0, 0, 1]])
 
     def _repr_html_(self) -> str:
         """The frame with all its channels, as a notebook shows it."""

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import ValidationError
 
 from gibench import gate
-from gibench.datasets import lightings, records
+from gibench.datasets import cameras, lightings, records
 from gibench.datasets.checked import first_problem, parsed, plain, shown
 from gibench.datasets.errors import DatasetError, FolderError
 from gibench.datasets.files import as_json, write_whole
@@ -194,7 +194,9 @@ def frame_table(records: Iterable[Mapping[str, Any]], recipe: Recipe) -> pd.Data
     """Return a row a frame, in the order of rooms and views.
 
     Columns: room, view, split, kind, file (from the dataset's folder), sha256, bytes, width, height,
-    camera_x … z and target_x … z (m), fov (horizontal, rad), path, step, exposure (for display), largest
+    camera_x … z and target_x … z (m), fov (horizontal, rad), up_x … z (NaN: Z is up), principal_point_x, y (from the
+    middle of the image to the right and down, as shares of its width and height), mirrored (0 or 1), path, step,
+    exposure (for display), largest
     (value of color), spp, paths, invalid_paths (counted as 0), median_error (relative standard error of
     color, before denoising), kernel_seconds, denoise_seconds, denoise_change (by how much denoising changed the mean
     of a part, where it is most), seconds (all of the renderer's time), seed. Where frames have light of their own, also
@@ -216,9 +218,7 @@ def frame_table(records: Iterable[Mapping[str, Any]], recipe: Recipe) -> pd.Data
             "bytes": frame["bytes"],
             "width": recipe.resolution[0],
             "height": recipe.resolution[1],
-            **{f"camera_{axis}": value for axis, value in zip("xyz", frame["camera"], strict=True)},
-            **{f"target_{axis}": value for axis, value in zip("xyz", frame["target"], strict=True)},
-            "fov": frame["fov"],
+            **cameras.columns_of(frame),
             "path": frame["path"],
             "step": frame["step"],
             "exposure": frame["exposure"],
@@ -251,8 +251,7 @@ COLUMNS = {
     "bytes": "int64",
     "width": "int64",
     "height": "int64",
-    **{f"{what}_{axis}": "float64" for what in ("camera", "target") for axis in "xyz"},
-    "fov": "float64",
+    **cameras.COLUMNS,
     "path": "str",
     "step": "int64",
     "exposure": "float64",

@@ -9,6 +9,7 @@ from pydantic import Field
 from gibench.datasets.checked import Amount, Checked, Count, Fingerprint, Sha256
 
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
+Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 RoomNumber = Annotated[str, Field(pattern=r"^[0-9]{1,9}$")]
 
 #: A file of a room from its folder. Whether it leads out of there is the gate's to say.
@@ -93,6 +94,9 @@ class FrameRecord(Checked):
     camera: Vector
     target: Vector
     fov: float
+    up: Vector | None = None
+    principal_point: Pair = Field(default_factory=lambda: [0.0, 0.0])
+    mirrored: bool = False
     path: str
     step: Count
     exposure: float | None

@@ -334,6 +334,7 @@ class RoomMaker:
             "camera": list(camera.position),
             "target": list(camera.target),
             "fov": camera.fov,
+            **camera.peculiarities,
             "path": camera.path,
             "step": camera.step,
             **({"lighting": lighting_record(room.lightings[view])} if room.lightings else {}),

@@ -33,7 +33,10 @@ LONGEST_TEXT = 1000
 #: How columns are written. Others multiply what is stored, such as strings as changes of the one before.
 ENCODINGS = {"PLAIN", "PLAIN_DICTIONARY", "RLE", "RLE_DICTIONARY", "BIT_PACKED"}
 
-#: Columns that every table has. What is not among them older tables lack, and is filled: NaN, "" or 0.
+#: What older tables lack and was a number all the same; everything else is filled with NaN, "" or 0.
+FILLED = {"principal_point_x": 0.0, "principal_point_y": 0.0}
+
+#: Columns that every table has.
 ALWAYS = (
     *("room", "view", "split", "kind", "file", "sha256", "bytes", "width", "height"),
     *(f"{what}_{axis}" for what in ("camera", "target") for axis in "xyz"),
@@ -78,7 +81,8 @@ def _read(path: Path, columns: dict[str, str]) -> pd.DataFrame:
     frames = pd.read_parquet(path)
     for name, dtype in columns.items():
         if name not in there:
-            frames[name] = pd.Series({"str": "", "int64": 0, "float64": math.nan}[dtype], frames.index, dtype)
+            missing = FILLED.get(name, {"str": "", "int64": 0, "float64": math.nan}[dtype])
+            frames[name] = pd.Series(missing, frames.index, dtype)
     return frames[[*columns, *(name for name in there if name not in columns)]]
 
 

@@ -18,6 +18,7 @@ from gibench.datasets.pool import Report, Work
 from gibench.datasets.recipes import Recipe
 from gibench.datasets.room_making import RoomMaker
 from gibench.errors import GibenchError
+from gibench.generators.parts import Camera
 from gibench.rendering.channels import CHANNELS, PARTS
 
 FACTS: dict[str, Any] = {
@@ -66,7 +67,7 @@ def render_frame(scene: Any, camera: Any, **settings: Any) -> SimpleNamespace:
 
 
 def sample_room(seed: int, index: int, *, kinds: tuple[str, ...], views: int, **_: Any) -> SimpleNamespace:
-    camera = SimpleNamespace(position=(0.0, 0.0, 1.5), target=(1.0, 0.0, 1.5), fov=1.2, path="", step=0)
+    camera = Camera((0.0, 0.0, 1.5), (1.0, 0.0, 1.5), 1.2)
     return SimpleNamespace(
         index=index,
         kind=kinds[0],

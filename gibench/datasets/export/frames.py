@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gibench.datasets.errors import DatasetError
 from gibench.datasets.loading import Frame
 from gibench.metrics import tone_map
 
@@ -43,5 +44,13 @@ def plain(value: Any) -> Any:
 
 
 def opengl_pose(frame: Frame) -> NDArray[np.float64]:
-    """(4, 4) camera to world with x to the right, y up and the view along −z, metres, world Z up."""
+    """(4, 4) camera to world with x to the right, y up and the view along −z, metres, world Z up.
+
+    Raises `DatasetError` where the camera is mirrored, for which tools of this convention have no pose.
+    """
+    if frame.camera.mirrored:
+        raise DatasetError(
+            f"room {frame.room}, view {frame.view} has a mirrored camera, which this format has no pose for: leave the "
+            "frame out, or export to webdataset or huggingface"
+        )
     return frame.camera_to_world @ np.diag([1.0, -1.0, -1.0, 1.0])

@@ -17,6 +17,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from gibench.datasets.errors import DatasetError
 from gibench.datasets.export.frames import opengl_pose
 from gibench.datasets.exr import decode
 from gibench.datasets.loading import Dataset, Frame
@@ -39,6 +40,13 @@ def write(dataset: Dataset, channels: tuple[str, ...], out: Path, tell: Any) -> 
     """Write a folder a room."""
     done = 0
     frames = sorted(dataset, key=lambda frame: (frame.room, frame.view))
+    for frame in frames:
+        if any(frame.camera.principal_point):
+            raise DatasetError(
+                f"room {frame.room}, view {frame.view} has an off-centre camera, which Hypersim's tables have no "
+                "column for: leave the frame out, or choose another format"
+            )
+        opengl_pose(frame)  # raises before anything is written where there is none
     for room, of_room in groupby(frames, lambda frame: frame.room):
         folder = out / f"ai_{room // 1000:03d}_{room % 1000:03d}"
         listed = list(of_room)

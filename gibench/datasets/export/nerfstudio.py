@@ -29,6 +29,8 @@ def write(dataset: Dataset, channels: tuple[str, ...], out: Path, tell: Any) -> 
     """Write `out/room-000017/transforms.json` and its pictures for every room."""
     done = 0
     frames = sorted(dataset, key=lambda frame: (frame.room, frame.view))
+    for frame in frames:
+        opengl_pose(frame)  # raises before anything is written where there is none
     for room, of_room in groupby(frames, lambda frame: frame.room):
         folder = out / f"room-{room:06d}"
         listed = list(of_room)
