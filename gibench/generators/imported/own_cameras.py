@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,11 +15,18 @@ import numpy as np
 from gibench import gate
 from gibench.generators.imported.changes import Change
 from gibench.generators.imported.errors import SceneFileError
+from gibench.generators.imported.films import film_of
 from gibench.generators.imported.transforms import matrix_of, numbers
 from gibench.generators.imported.tree import Node
 from gibench.generators.parts import Camera, FloatArray
+from gibench.rendering.camera import CameraError, PinholeCamera
 
-NEGLIGIBLE_ROLL = math.radians(0.1)
+NEGLIGIBLE_ROLL = 1e-4
+"""Radians: a tenth of a pixel at the border of a wide image. A camera that is rolled by less has Z up."""
+
+ORTHOGONAL = 1e-3
+"""How far a camera's matrix may be from a rotation, as a share; what Mitsuba allows."""
+
 FULL_FRAME = math.hypot(36.0, 24.0)
 """Diagonal of the film that focal lengths are given for, mm."""
 
@@ -32,26 +39,45 @@ class GivenCamera:
     """A pinhole camera whose field of view may depend on the shape of the image.
 
     position, target: metres, Z up. angle: field of view, radians. axis: what it spans: "x", "y", "diagonal", "smaller"
-    or "larger". near: what is closer along the optical axis is cut away by Mitsuba, and seen here; metres. where: its
-    place in the scene file.
+    or "larger", of the whole film. up, mirrored: as those of a `PinholeCamera`. principal_point: where the optical axis
+    meets the film, from its middle to the right and down, as shares of its width and height. window: what of the film
+    is the image: its left, its top, its width and its height, as shares of the film's. near: what is closer along the
+    optical axis is cut away by Mitsuba, and seen here; metres. where: its place in the scene file.
     """
 
     position: tuple[float, float, float]
     target: tuple[float, float, float]
     angle: float
     axis: str
+    up: tuple[float, float, float] | None = None
+    mirrored: bool = False
+    principal_point: tuple[float, float] = (0.0, 0.0)
+    window: tuple[float, float, float, float] = (0.0, 0.0, 1.0, 1.0)
     near: float = 0.0
     where: str = ""
 
     def at(self, resolution: tuple[int, int]) -> Camera:
-        """The camera for images of this (width, height), as Mitsuba would fit it."""
-        width, height = resolution
+        """The camera for images of this (width, height), as Mitsuba would fit it.
+
+        The image is the window of the film, so that the film is as much larger.
+        """
+        left, top, share, share_down = self.window
+        width, height = resolution[0] / share, resolution[1] / share_down
         axis = self.axis
         if axis in ("smaller", "larger"):
             axis = "x" if (width < height) == (axis == "smaller") else "y"
         extent = {"x": width, "y": height, "diagonal": math.hypot(width, height)}[axis]
-        fov = 2 * math.atan(math.tan(self.angle / 2) * width / extent)
-        return Camera(self.position, self.target, fov)
+        fov = 2 * math.atan(math.tan(self.angle / 2) * width / extent * share)
+        x, y = self.principal_point
+        point = (x + (0.5 - (left + share / 2))) / share, (y + (0.5 - (top + share_down / 2))) / share_down
+        return Camera(
+            self.position,
+            self.target,
+            fov,
+            up=self.up,
+            principal_point=point,
+            mirrored=self.mirrored,
+        )
 
 
 Note = Callable[..., None]
@@ -66,42 +92,63 @@ def cameras_of(root: Node, note: Note) -> list[GivenCamera]:
             continue
         if sensor.type == "thinlens":
             note(sensor, "a thin lens is a pinhole: everything is in focus", True)
-        for name in ("principal_point_offset_x", "principal_point_offset_y"):
-            offset = sensor.property(name)
-            if offset is not None and numbers(offset, offset.get("value", ""), 1)[0] != 0:
-                note(sensor, f"{name} is left out", True)
         matrix = matrix_of(sensor.property("to_world"))
         angle, axis = _field_of_view(sensor)
-        camera, losses = _aimed(matrix, angle, axis, sensor.where)
-        for loss in losses:
-            note(sensor, loss, True)
+        camera = _aimed(matrix, angle, axis, sensor.where)
+        if _uneven(matrix):
+            note(sensor, "a camera's shear or uneven scale is left out", True)
         near = sensor.property("near_clip")
         # What lies along the optical axis before this is cut away; the scene's scale is in the matrix.
         size = float(np.linalg.norm(matrix[:3, 2]))
         clip = 0.0 if near is None else size * float(numbers(near, near.get("value", ""), 1)[0])
-        cameras.append(replace(camera, near=clip, where=sensor.where))
+        # Mitsuba counts from the principal point to the middle of the film.
+        point = -_offset(sensor, "x"), -_offset(sensor, "y")
+        cameras.append(
+            replace(camera, principal_point=point, window=_window(sensor), near=clip, where=sensor.where)
+        )
     return cameras
 
 
-def _aimed(matrix: FloatArray, angle: float, axis: str, where: str) -> tuple[GivenCamera, list[str]]:
-    """A camera from its matrix, columns left, up, forward and position; and what of it is left out, in words."""
+def _offset(sensor: Node, axis: str) -> float:
+    offset = sensor.property(f"principal_point_offset_{axis}")
+    return 0.0 if offset is None else float(numbers(offset, offset.get("value", ""), 1)[0])
+
+
+def _window(sensor: Node) -> tuple[float, float, float, float]:
+    film = film_of(sensor)
+    (width, height), (x, y), (across, down) = film.size, film.corner, film.window
+    return x / width, y / height, across / width, down / height
+
+
+def _aimed(matrix: FloatArray, angle: float, axis: str, where: str) -> GivenCamera:
+    """A camera from its matrix, columns left, up, forward and position, of any length."""
     if not np.isfinite(matrix).all() or abs(np.linalg.det(matrix[:3, :3])) < 1e-12:
         raise SceneFileError(f"{where}: the camera's transformation is singular")
     if not 0 < angle < math.pi:
         raise SceneFileError(f"{where}: a field of view of {math.degrees(angle):g} degrees is none")
     forward = matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
-    up = matrix[:3, 1] / np.linalg.norm(matrix[:3, 1])
     position = matrix[:3, 3]
-    level = np.cross([0.0, 0.0, 1.0], forward)
-    roll = 0.0
-    if np.linalg.norm(level) > 1e-6:
-        level /= np.linalg.norm(level)
-        upright = np.cross(forward, level)
-        roll = math.atan2(float(np.dot(up, level)), float(np.dot(up, upright)))
-    losses = ["a mirrored camera looks the right way round"] if np.linalg.det(matrix[:3, :3]) < 0 else []
-    if abs(roll) > NEGLIGIBLE_ROLL:
-        losses.append(f"a camera's roll of {math.degrees(roll):.1f} degrees is left out")
-    return GivenCamera(_triple(position), _triple(position + 2 * forward), angle, axis), losses
+    up = _triple(matrix[:3, 1] / np.linalg.norm(matrix[:3, 1]))
+    camera = GivenCamera(
+        _triple(position),
+        _triple(position + 2 * forward),
+        angle,
+        axis,
+        mirrored=bool(np.linalg.det(matrix[:3, :3]) < 0),
+    )
+    return replace(camera, up=up) if abs(_roll(camera, up)) > NEGLIGIBLE_ROLL else camera
+
+
+def _uneven(matrix: FloatArray) -> bool:
+    """Whether the axes of a camera's matrix are of several lengths or not at right angles to each other."""
+    size = np.linalg.norm(matrix[:3, 2])
+    return bool(np.abs(matrix[:3, :3].T @ matrix[:3, :3] / size**2 - np.eye(3)).max() > ORTHOGONAL)
+
+
+def _roll(camera: GivenCamera, up: tuple[float, float, float]) -> float:
+    """Radians from the top of the image of a camera with Z up to `up`, counter-clockwise in the image."""
+    right, down, _ = PinholeCamera(camera.position, camera.target, 1.0).frame
+    return math.atan2(float(-np.dot(right, up)), float(-np.dot(down, up)))
 
 
 def _triple(values: FloatArray) -> tuple[float, float, float]:
@@ -128,12 +175,12 @@ def _field_of_view(sensor: Node) -> tuple[float, str]:
 def read_camera_file(
     path: Path, placed: FloatArray, changes: list[Change] | None = None
 ) -> list[GivenCamera]:
-    """Cameras of a JSON file: a list of objects, each with `fov_degrees` (horizontal) and `origin` and `target`, or
-    `matrix`.
+    """Cameras of a JSON file: a list of objects, each with `fov_degrees` (horizontal), and `origin` and `target`, or
+    `matrix`. `up` may stand beside `target`, and `principal_point` beside either, as those of a `PinholeCamera`.
 
     placed: (4, 4) from the scene file's coordinates, in which the file counts, to Z-up metres. matrix: 4 × 4 by row,
-    camera to world, whose columns are left, up, forward and position, as in Mitsuba's to_world. changes: what of a
-    camera is left out goes there.
+    camera to world, whose columns are left, up, forward and position, as in Mitsuba's to_world. changes: matrices that
+    roll or mirror the image go there, as those of other conventions do.
 
     Raises SceneFileError.
     """
@@ -150,30 +197,57 @@ def read_camera_file(
     cameras = []
     for number, entry in enumerate(entries):
         where = f"{path}, camera {number}"
-        camera, losses = _from_json(entry, where, placed)
+        camera = _from_json(entry, where, placed)
         cameras.append(camera)
-        if changes is not None:
-            changes += [Change("cameras", loss, where, loss=True) for loss in losses]
+        if changes is not None and "matrix" in entry:
+            matrix = placed @ np.array(entry["matrix"], dtype=np.float64)
+            changes += [Change("cameras", what, where, loss=True) for what in _unusual(camera, matrix)]
     return cameras
 
 
-def _from_json(entry: Any, where: str, placed: FloatArray) -> tuple[GivenCamera, list[str]]:
+CONVENTION = "are the columns of its matrix left, up, forward and position?"
+
+
+def _unusual(camera: GivenCamera, matrix: FloatArray) -> Iterator[str]:
+    """What a matrix of another convention looks like, in words."""
+    if camera.mirrored:
+        yield f"a mirrored camera is rendered as it is: {CONVENTION}"
+    if camera.up is not None:
+        roll = math.degrees(_roll(camera, camera.up))
+        yield f"a camera's roll of {roll:.1f} degrees is rendered as it is: {CONVENTION}"
+    if _uneven(matrix):
+        yield f"a camera's shear or uneven scale is left out: {CONVENTION}"
+
+
+def _from_json(entry: Any, where: str, placed: FloatArray) -> GivenCamera:
     if not isinstance(entry, Mapping):
         raise SceneFileError(f'{where}: it is no object like {{"origin": …, "target": …, "fov_degrees": 60}}')
-    allowed = {"origin", "target", "fov_degrees", "matrix"}
+    allowed = {"origin", "target", "up", "fov_degrees", "matrix", "principal_point"}
     if unknown := sorted(set(entry) - allowed):
         raise SceneFileError(f"{where}: unknown key '{unknown[0]}'; known are {', '.join(sorted(allowed))}")
     angle = math.radians(float(_array(entry.get("fov_degrees"), (), where, "fov_degrees")))
+    x, y = _array(entry.get("principal_point", (0, 0)), (2,), where, "principal_point")
+    point = float(x), float(y)
     if "matrix" in entry:
+        if other := sorted({"origin", "target", "up"} & set(entry)):
+            raise SceneFileError(f"{where}: '{other[0]}' beside 'matrix': leave one of them out")
         matrix = placed @ _array(entry["matrix"], (4, 4), where, "matrix")
-        return _aimed(matrix, angle, "x", where)
+        return replace(_aimed(matrix, angle, "x", where), principal_point=point)
     origin, target = (_array(entry.get(name), (3,), where, name) for name in ("origin", "target"))
     if np.array_equal(origin, target):
         raise SceneFileError(f"{where}: origin and target are the same point")
     if not 0 < angle < math.pi:
         raise SceneFileError(f"{where}: fov_degrees must lie between 0 and 180")
     origin, target = (placed[:3, :3] @ point + placed[:3, 3] for point in (origin, target))
-    return GivenCamera(_triple(origin), _triple(target), angle, "x"), []
+    camera = GivenCamera(_triple(origin), _triple(target), angle, "x", principal_point=point)
+    if "up" not in entry:
+        return camera
+    up = _triple(placed[:3, :3] @ _array(entry["up"], (3,), where, "up"))
+    try:
+        PinholeCamera(camera.position, camera.target, angle, up)
+    except CameraError:
+        raise SceneFileError(f"{where}: up is along the view, or 0: give another direction") from None
+    return replace(camera, up=up) if abs(_roll(camera, up)) > NEGLIGIBLE_ROLL else camera
 
 
 def _array(value: Any, shape: Sequence[int], where: str, name: str) -> FloatArray:

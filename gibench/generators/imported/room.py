@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import shutil
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -24,7 +23,6 @@ from gibench.generators.imported.scene import ImportedScene
 from gibench.generators.imported.tree import Node
 from gibench.generators.parts import Camera, FloatArray
 from gibench.generators.scene_files import camera_records, lighting_records, sensor_element
-from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.lighting import Lighting
 from gibench.rendering.scene import OPENINGS
 
@@ -156,10 +154,12 @@ def _near_planes_told(scene: ImportedScene, resolution: tuple[int, int]) -> Impo
         if given.near <= 0 or is_scalar():
             continue
         camera = given.at(resolution)
-        right, down, forward = PinholeCamera(camera.position, camera.target, camera.fov).frame
-        width = math.tan(camera.fov / 2)
-        x, y = np.meshgrid(np.linspace(-1, 1, 48), np.linspace(-1, 1, 36) * resolution[1] / resolution[0])
-        rays = forward + width * (x.ravel()[:, None] * right + y.ravel()[:, None] * down)
+        right, down, forward = camera.pinhole.frame
+        (x, y), focal = camera.pinhole.centre(resolution), camera.pinhole.focal_length(resolution[0])
+        across, along = np.meshgrid(
+            (np.linspace(0, resolution[0], 48) - x) / focal, (np.linspace(0, resolution[1], 36) - y) / focal
+        )
+        rays = forward + across.ravel()[:, None] * right + along.ravel()[:, None] * down
         length = np.linalg.norm(rays, axis=1, keepdims=True)
         distance = hits(scene.loaded, np.tile(camera.position, (len(rays), 1)), rays / length)[0]
         if (distance < given.near * length[:, 0]).any():

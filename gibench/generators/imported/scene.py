@@ -19,6 +19,7 @@ from gibench.generators.imported.changes import Change
 from gibench.generators.imported.distance_grids import mesh_grids
 from gibench.generators.imported.errors import SceneFileError
 from gibench.generators.imported.files import destinations, named_files, settle_missing
+from gibench.generators.imported.films import DEFAULT_SIZE, film_of, whole_number
 from gibench.generators.imported.images import check_images, made_images
 from gibench.generators.imported.mesh_files import check_meshes
 from gibench.generators.imported.obj_files import split_objs
@@ -39,9 +40,6 @@ from gibench.generators.imported.upgrading import upgrade
 if TYPE_CHECKING:
     from gibench.rendering.scene import Scene
 
-
-DEFAULT_SIZE = (768, 576)
-"""Mitsuba's, of a film."""
 
 DEFAULT_DEPTH = -1
 """Mitsuba's, of a path tracer: no limit."""
@@ -79,7 +77,7 @@ class ImportedScene:
 
     name: that of its folder, or of its file where that says more. tree: the scene, its file names as in the source. up,
     scale: what was done to it. cameras: its own, then those of the camera file. resolution: (width, height) of its
-    first film; max_depth: of its integrator, as Mitsuba counts. changes: what was rewritten, missing: files that were
+    first image; max_depth: of its integrator, as Mitsuba counts. changes: what was rewritten, missing: files that were
     left out, as the scene names them. files: file → name in a room's folder.
     """
 
@@ -203,27 +201,15 @@ def import_scene(file: Path, settings: ImportSettings | None = None) -> Imported
 
 
 def _settled_settings(root: Node) -> tuple[tuple[int, int], int]:
-    """Size of the first film and depth of the integrator; sensors and integrators go, as whoever renders has them."""
-    size, depth = DEFAULT_SIZE, DEFAULT_DEPTH
+    """Size of the first image and depth of the integrator; sensors and integrators go, as whoever renders has them."""
+    size, depth = None, DEFAULT_DEPTH
     for node in root.nodes("sensor", "integrator"):
         root.remove(node)
-        for film in node.nodes("film")[:1]:
-            if size is DEFAULT_SIZE:
-                size = (_whole(film, "width", size[0]), _whole(film, "height", size[1]))
+        if size is None and node.nodes("film"):
+            size = film_of(node).window
         if node.tag == "integrator":
-            depth = _whole(node, "max_depth", DEFAULT_DEPTH)
-    return size, depth
-
-
-def _whole(node: Node, name: str, default: int) -> int:
-    text = node.value(name, str(default))
-    try:
-        value = int(text)
-    except ValueError:
-        raise SceneFileError(f"{node.where}: {name} '{text[:40]}' is no whole number") from None
-    if node.tag == "film" and not 1 <= value <= 16384:
-        raise SceneFileError(f"{node.where}: a film has a {name} from 1 to 16384, not {value}")
-    return max(-1, min(value, 2**31 - 1))
+            depth = max(-1, whole_number(node, "max_depth", DEFAULT_DEPTH))
+    return size or DEFAULT_SIZE, depth
 
 
 def scene_title(file: Path) -> str:

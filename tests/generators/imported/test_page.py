@@ -95,8 +95,8 @@ def test_the_camera_file_is_one(tmp_path):
     (block,) = blocks("json")
     (tmp_path / "cameras.json").write_text(block)
     cameras = read_camera_file(tmp_path / "cameras.json", np.eye(4))
-    assert len(cameras) == len(json.loads(block)) == 2
-    for camera in cameras:  # both stand at the same place and look along −z
+    assert len(cameras) == len(json.loads(block)) == 3
+    for camera in cameras:  # all stand at the same place and look along −z
         np.testing.assert_allclose(camera.position, (0, 1.5, 4.9))
         assert np.subtract(camera.target, camera.position)[2] < 0
 

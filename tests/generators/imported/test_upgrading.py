@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from gibench.generators.imported.errors import SceneFileError
+from gibench.generators.imported.films import Film, film_of
 from gibench.generators.imported.upgrading import RULES
 from gibench.rendering.backend import select_variant
 
@@ -566,7 +567,7 @@ def test_the_sun_by_hour_and_date(tmp_path, values, expected):
     loads(root)
 
 
-def test_what_a_film_and_an_integrator_ask_for_is_named_where_it_is_left_out(tmp_path):
+def test_a_film_keeps_its_window_and_what_an_integrator_hides_is_named(tmp_path):
     film = (
         '<film type="hdrfilm"><integer name="width" value="64"/><integer name="height" value="48"/>'
         '<integer name="crop_offset_x" value="{}"/><integer name="crop_width" value="{}"/></film>'
@@ -575,11 +576,11 @@ def test_what_a_film_and_an_integrator_ask_for_is_named_where_it_is_left_out(tmp
         '<integrator type="path"><boolean name="hide_emitters" value="true"/></integrator>'
         '<sensor type="perspective">'
     )
-    _, changes = upgraded(tmp_path, body + film.format(8, 16) + "</sensor>", version="3.0.0")
+    root, changes = upgraded(tmp_path, body + film.format(8, 16) + "</sensor>", version="3.0.0")
     assert [c.what for c in changes if c.loss] == [
-        "hide_emitters is left out: lamps and the environment are seen",
-        "the crop window 16xall at 8, 0 is left out: the whole film is rendered",
+        "hide_emitters is left out: lamps and the environment are seen"
     ]
+    assert film_of(one(root, "sensor")) == Film((64, 48), (8, 0), (16, 48))
     _, changes = upgraded(
         tmp_path, body.replace("true", "false") + film.format(0, 64) + "</sensor>", version="3.0.0"
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from gibench.generators.imported.changes import Note
+from gibench.generators.imported.films import CROP, SIDES
 from gibench.generators.imported.tree import Node
 from gibench.generators.imported.upgrading.rules import become
 
@@ -34,7 +35,7 @@ def integrators(root: Node, note: Note) -> None:
 
 
 def films(root: Node, note: Note) -> None:
-    """Films and samplers are those of whoever renders the scene: of a film the size stays, of a sampler nothing."""
+    """Films and samplers are those of whoever renders the scene: of a film the size and the window of it stay."""
     for sensor in root.nodes("sensor"):
         for part in sensor.nodes("film", "sampler"):
             if part.tag == "sampler":
@@ -44,17 +45,5 @@ def films(root: Node, note: Note) -> None:
                 note(part, f"{part.type} is hdrfilm")
             if part.property("high_quality_edges") is not None:
                 note(part, "high_quality_edges is left out")
-            _note_crop(part, note)
-            part[:] = [p for p in (part.property("width"), part.property("height")) if p is not None]
+            part[:] = [p for p in map(part.property, (*SIDES, *CROP)) if p is not None]
             part.set("type", "hdrfilm")
-
-
-def _note_crop(film: Node, note: Note) -> None:
-    """Say so where a film shows a part of its image alone."""
-    crop = {name: film.value(f"crop_{name}") for name in ("offset_x", "offset_y", "width", "height")}
-    whole = {"offset_x": ("", "0"), "offset_y": ("", "0")}
-    whole |= {name: ("", film.value(name)) for name in ("width", "height")}
-    if any(value not in whole[name] for name, value in crop.items()):
-        asked = f"{crop['width'] or 'all'}x{crop['height'] or 'all'}"
-        asked += f" at {crop['offset_x'] or 0}, {crop['offset_y'] or 0}"
-        note(film, f"the crop window {asked} is left out: the whole film is rendered", loss=True)
