@@ -302,7 +302,7 @@ def test_the_table_of_options_is_that_of_the_help(capsys, monkeypatch):
 
 def test_every_column_of_the_table_of_frames_is_listed():
     listed = page("datasets").split("The columns of `frames.parquet`:")[1].split("\n\n")[0]
-    middles = {"camera_y", "target_y"}  # "`camera_x` … `camera_z`"
+    middles = {"camera_y", "target_y", "up_y"}  # "`camera_x` … `camera_z`"
     assert set(re.findall(r"`(\w+)`", listed)) - {"color"} == set(COLUMNS) - middles
 
 
