@@ -17,6 +17,9 @@ NEAREST_TARGET = 1e-9
 ALONG = 1e-7
 """Sine of the angle between the view and up below which they count as parallel."""
 
+FARTHEST_CENTRE = 1e5
+"""Sizes of the image that the principal point may be away: pixels of its middle are still told apart in float32."""
+
 
 class CameraError(GibenchError, ValueError):
     """A camera that sees nothing, or a resolution that is none."""
@@ -53,9 +56,10 @@ class PinholeCamera:
                 f"camera at {self.position} towards {self.target} with a field of view of {self.fov} rad: position "
                 "and target must be finite and apart, the field of view between 0 and pi"
             )
-        if len(self.principal_point) != 2 or not np.isfinite(self.principal_point).all():
+        if len(self.principal_point) != 2 or not (np.abs(self.principal_point) <= FARTHEST_CENTRE).all():
             raise CameraError(
-                f"camera at {self.position}: its principal point {self.principal_point} is none"
+                f"camera at {self.position}: its principal point {self.principal_point} must be two numbers up to "
+                f"{FARTHEST_CENTRE:g} sizes of the image away"
             )
         if self.up is not None and not self._stands():
             raise CameraError(

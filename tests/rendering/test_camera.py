@@ -150,6 +150,7 @@ def test_a_roll_turns_the_image_and_a_mirror_exchanges_left_and_right():
         {"up": (1, 0)},
         {"principal_point": (0, float("nan"))},
         {"principal_point": (0, 0, 0)},
+        {"principal_point": (1e300, 0)},
     ],
 )
 def test_ups_and_principal_points_that_are_none(options):

@@ -226,7 +226,8 @@ def _scenes(root: Path) -> None:
     Image.fromarray(np.zeros((4, 4, 3), np.uint8)).save(root / "picture.png")
     cameras = [
         {"origin": [0, -2, 1], "target": [0, 0, 1], "fov_degrees": 60},
-        {"matrix": np.eye(4).tolist(), "fov_degrees": 45},
+        {"matrix": np.eye(4).tolist(), "fov_degrees": 45, "principal_point": [0.1, -0.2]},
+        {"origin": [0, -2, 1], "target": [0, 0, 1], "up": [1, 0, 1], "fov_degrees": 60},
     ]
     (root / "cameras.json").write_text(json.dumps(cameras))
 

@@ -24,6 +24,9 @@ from gibench.rendering.camera import CameraError, PinholeCamera
 NEGLIGIBLE_ROLL = 1e-4
 """Radians: a tenth of a pixel at the border of a wide image. A camera that is rolled by less has Z up."""
 
+FARTHEST_OFFSET = 100.0
+"""Of a principal point, in films."""
+
 ORTHOGONAL = 1e-3
 """How far a camera's matrix may be from a rotation, as a share; what Mitsuba allows."""
 
@@ -111,7 +114,14 @@ def cameras_of(root: Node, note: Note) -> list[GivenCamera]:
 
 def _offset(sensor: Node, axis: str) -> float:
     offset = sensor.property(f"principal_point_offset_{axis}")
-    return 0.0 if offset is None else float(numbers(offset, offset.get("value", ""), 1)[0])
+    if offset is None:
+        return 0.0
+    value = float(numbers(offset, offset.get("value", ""), 1)[0])
+    if abs(value) > FARTHEST_OFFSET:
+        raise SceneFileError(
+            f"{offset.where}: an offset of {value:g} films is none: write a share of the film"
+        )
+    return value
 
 
 def _window(sensor: Node) -> tuple[float, float, float, float]:
@@ -228,6 +238,8 @@ def _from_json(entry: Any, where: str, placed: FloatArray) -> GivenCamera:
     angle = math.radians(float(_array(entry.get("fov_degrees"), (), where, "fov_degrees")))
     x, y = _array(entry.get("principal_point", (0, 0)), (2,), where, "principal_point")
     point = float(x), float(y)
+    if max(map(abs, point)) > FARTHEST_OFFSET:
+        raise SceneFileError(f"{where}: a principal_point of {x:g}, {y:g} is none: write shares of the image")
     if "matrix" in entry:
         if other := sorted({"origin", "target", "up"} & set(entry)):
             raise SceneFileError(f"{where}: '{other[0]}' beside 'matrix': leave one of them out")

@@ -24,6 +24,7 @@ from tests.baselines.probes.test_maps import written
 
 SIZE = (64, 48)
 ABOVE = PinholeCamera((0.3, -2.0, 2.5), (0.0, 0.2, 0.0), 1.0)
+ODD = PinholeCamera(ABOVE.position, ABOVE.target, 0.8, (0.5, 0.0, 1.0), (0.2, -0.1), mirrored=True)
 
 
 def vectors(kind, values):
@@ -206,15 +207,16 @@ def test_points_stay_on_the_screen_and_on_the_material():
         np.testing.assert_array_less(value, 1.0001)
 
 
-def test_steps_end_at_the_border_of_the_screen():
+@pytest.mark.parametrize("camera", [ABOVE, ODD], ids=["ordinary", "rolled and off-centre"])
+def test_steps_end_at_the_border_of_the_screen(camera):
     """Against the projection of points along the step; those that stay on the screen are not shortened."""
-    surface = screen(ABOVE, floor)
+    surface = screen(camera, floor)
     start = columns(surface.position).astype(np.float64)
     move = np.random.default_rng(5).normal(size=start.shape) * [3.0, 3.0, 1.0]
     share = np.array(surface.share_within(surface.position, vectors(mi.Vector3f, move))).astype(np.float64)
     along = np.linspace(0, 1, 2001)
     points = start[:, None] + along[:, None] * move[:, None]
-    x, y, depth = ABOVE.project(points.reshape(-1, 3), SIZE)
+    x, y, depth = camera.project(points.reshape(-1, 3), SIZE)
     inside = (depth > 0) & (x >= 0) & (x <= SIZE[0]) & (y >= 0) & (y <= SIZE[1])
     inside = inside.reshape(points.shape[:2])
     leaves = ~inside.all(axis=1)

@@ -156,6 +156,14 @@ def test_windows_beyond_their_film_are_refused(tmp_path, window, said):
         import_scene(written(tmp_path, body, version="3.0.0"))
 
 
+def test_an_offset_that_is_none(tmp_path):
+    offset = '<float name="principal_point_offset_y" value="1e30"/>'
+    with pytest.raises(SceneFileError, match=r"scene\.xml:2: an offset of 1e\+30 films is none"):
+        import_scene(
+            written(tmp_path, f'{SQUARE}<sensor type="perspective">{offset}</sensor>', version="3.0.0")
+        )
+
+
 def test_sheared_cameras_are_said(tmp_path):
     matrix = '<matrix value="-1 0.1 0 0 0 1 0 1 0 0 -1 4 0 0 0 1"/>'
     body = f'<sensor type="perspective"><transform name="to_world">{matrix}</transform></sensor>'
@@ -189,6 +197,7 @@ def test_a_camera_file_gives_up_and_the_principal_point(tmp_path):
         ({**aim, "up": [0, 0, 0]}, "up is along the view"),
         ({**aim, "up": [0, 0]}, "up is missing or not 3 numbers"),
         ({**aim, "principal_point": [1]}, "principal_point is missing or not 2 numbers"),
+        ({**aim, "principal_point": [1e9, 0]}, r"a principal_point of 1e\+09, 0 is none"),
         ({"matrix": np.eye(4).tolist(), "up": [0, 0, 1]}, "'up' beside 'matrix'"),
     ):
         with pytest.raises(SceneFileError, match=f"camera 0: {message}"):
