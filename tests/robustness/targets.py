@@ -46,6 +46,7 @@ def _run(root: Path) -> None:
 def _read_run(root: Path) -> None:
     from gibench.benchmarks import scoring, statistics
     from gibench.benchmarks.report.csv_files import write_csv_files
+    from gibench.benchmarks.report.runs import Runs
     from gibench.benchmarks.report.summary import summarise
     from gibench.benchmarks.report.tables import write_tables
     from gibench.benchmarks.result_files import RunFolder
@@ -60,9 +61,10 @@ def _read_run(root: Path) -> None:
     for table in ("results", "times", "stages", "frames", "sequences", "floor", "skipped"):
         getattr(results, table)
     if not results.frames.empty:
-        summary = summarise(results)
-        write_csv_files(results, summary, root)
-        write_tables(results, summary, root)
+        runs = Runs([results])
+        summary = summarise(runs)
+        write_csv_files(runs, summary, root)
+        write_tables(runs, summary, root)
         statistics.leaderboard(results, results.run["metrics"][0])
     tell_results(root)
     tell_board(root)

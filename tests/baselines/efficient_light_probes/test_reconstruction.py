@@ -13,6 +13,7 @@ from gibench.baselines.efficient_light_probes.reconstruction import as_image
 from gibench.baselines.method import MethodError, View
 from gibench.baselines.stages import Stages
 from gibench.baselines.training import artifacts, checkpoints
+from gibench.datasets.cameras import columns_of
 from gibench.datasets.loading import Frame
 from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.lighting import Shot
@@ -44,12 +45,8 @@ class Still(Frame):
     """A training view in memory."""
 
     def __init__(self, view, camera, color):
-        columns = {
-            f"{what}_{axis}": value
-            for what, point in (("camera", camera.position), ("target", camera.target))
-            for axis, value in zip("xyz", point, strict=True)
-        }
-        super().__init__(None, {"room": 0, "view": view, "fov": camera.fov, "file": f"{view}", **columns})
+        record = {"camera": camera.position, "target": camera.target, "fov": camera.fov}
+        super().__init__(None, {"room": 0, "view": view, "file": f"{view}", **columns_of(record)})
         self.color = color
 
     def read(self, *channels):
