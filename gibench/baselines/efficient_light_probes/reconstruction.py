@@ -17,6 +17,7 @@ from gibench.baselines.efficient_light_probes.implementation import ReflectionSe
 from gibench.baselines.efficient_light_probes.temporal import DECAY, accumulated, reprojected
 from gibench.baselines.efficient_light_probes.training import Plan, trained_network
 from gibench.baselines.first_hits import hits_of_rays
+from gibench.baselines.image_to_image.device_frames import as_image, torch_device
 from gibench.baselines.method import Prediction, Setting, Site, View
 from gibench.baselines.replay import Replay, camera_arrays, ray_generator
 from gibench.baselines.stages import Stages
@@ -36,15 +37,6 @@ def _guides(scene, _lightmap, camera, preliminary, mirrored, glossy, width: int,
     reflected = surface.albedo(scene, there.bsdf(ray), there, glossy & there.is_valid())
     dr.eval(depth, albedo, reflected)
     return depth, albedo, reflected
-
-
-def as_image(values: Any, resolution: tuple[int, int], grid: int) -> Tensor:
-    """Lanes of a grid (width, height) as (C, H, W) float32 on their device, each pixel the mean of grid × grid."""
-    width, height = resolution
-    parts = list(values) if isinstance(values, (mi.Color3f, mi.Vector3f)) else [values]
-    # A constant has one lane.
-    lanes = torch.stack([part.torch().expand(width * height) for part in parts])
-    return lanes.reshape(-1, height // grid, grid, width // grid, grid).mean(dim=(2, 4))
 
 
 class Reconstruction(ReflectionSearch):
@@ -73,8 +65,7 @@ class Reconstruction(ReflectionSearch):
 
         trained = trained_network(site, plan, METHOD.baked_settings(self.settings), made)
         self.scale, self.epoch = trained.scale, trained.epoch
-        device = "cuda" if dr.backend_v(mi.Float) == dr.JitBackend.CUDA else "cpu"
-        self.network = trained.network.eval().requires_grad_(False).to(device)
+        self.network = trained.network.eval().requires_grad_(False).to(torch_device())
 
     def forget(self) -> None:
         """Begin another path."""

@@ -20,10 +20,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn.functional import dropout2d, interpolate, leaky_relu, softmax
 
+from gibench.baselines.image_to_image.shading import GEOMETRY, LIGHT
 from gibench.baselines.training.padding import padded
-
-GEOMETRY = 7
-"""Channels of the geometry: position 3, normal 3, depth 1."""
 
 SLOPE = 0.2
 """Of Leaky ReLU below zero."""
@@ -151,7 +149,7 @@ class GeometryAware(nn.Module):
         light, geometry = size.light, size.geometry
         self.size = size
         self.geometry = GeometryEncoder(geometry)
-        self.down = _down(2 * size.colours, light)
+        self.down = _down(LIGHT * size.colours, light)
         self.up = _up(light)
         self.falling = nn.ModuleList(Modulation(g, c) for g, c in zip(geometry, light, strict=True))
         self.rising = nn.ModuleList(
@@ -174,7 +172,7 @@ class GeometryAware(nn.Module):
         relative to the camera, normal, depth, in units of the scene.
         """
         height, width = geometry.shape[-2:]
-        light = padded(light.flatten(1, 2), self.multiple).unflatten(1, (2, 3))
+        light = padded(light.flatten(1, 2), self.multiple).unflatten(1, (LIGHT, 3))
         geometry = padded(geometry, self.multiple)
         falling, rising = self.geometry(geometry)
         inputs = [geometry]

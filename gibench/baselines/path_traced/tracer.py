@@ -57,7 +57,7 @@ def trace_rows(
     indirect = path.indirect_diffuse + path.indirect_specular
     specular = path.direct_specular + path.indirect_specular
     lit = path.emission + path.direct_diffuse + path.indirect_diffuse + specular
-    images = {"full": lit, "specular": specular, "indirect": indirect}
+    images = {"full": lit, "specular": specular, "indirect": indirect, "direct_diffuse": path.direct_diffuse}
     values: dict[str, Any] = {name: image for name, image in images.items() if name in ("full", *parts)}
     values |= {"albedo": path.albedo, "normal": path.normal}
     # A path that overflows counts as black. Shares are summed, so that huge radiance does not overflow on the way.
@@ -87,9 +87,14 @@ class PathTracer:
 
     def prepare(self, site: Site) -> None:
         """Keep the scene."""
-        self._parts = [part for part in ("full", "specular", "indirect") if part in ("full", *site.parts)]
+        self._parts = self.parts_of(site)
         depth = site.max_depth if self.max_depth is None else self.max_depth
         self._kernel = Replay(site.scene, partial(trace_rows, site.scene, depth, tuple(self._parts)))
+
+    @staticmethod
+    def parts_of(site: Site) -> list[str]:
+        """Names of the images that are traced, "full" first."""
+        return [part for part in ("full", "specular", "indirect") if part in ("full", *site.parts)]
 
     def render(self, view: View, stages: Stages) -> Prediction:
         """Trace, then denoise the image as a whole, as a renderer shows it, and each part that is scored once more.

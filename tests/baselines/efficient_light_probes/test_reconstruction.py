@@ -9,7 +9,6 @@ import pytest
 import torch
 
 from gibench.baselines.efficient_light_probes import METHOD, SEARCH, training
-from gibench.baselines.efficient_light_probes.reconstruction import as_image
 from gibench.baselines.method import MethodError, View
 from gibench.baselines.stages import Stages
 from gibench.baselines.training import artifacts, checkpoints
@@ -170,19 +169,6 @@ def test_what_a_frame_tells(where):
     assert (found.color >= 0).all()
     assert found.extra["parameters"] == 121435
     assert 0 <= found.extra["best_epoch"] <= SMALL["epochs"]
-
-
-def test_images_of_lanes_are_means_of_their_cells():
-    import mitsuba as mi
-
-    lanes = np.arange(4 * 6, dtype=np.float32)
-    expected = lanes.reshape(2, 2, 3, 2).mean(axis=(1, 3))
-    one = as_image(mi.Float(lanes), (6, 4), 2)
-    three = as_image(mi.Color3f(lanes, 2 * lanes, 0), (6, 4), 2)
-    np.testing.assert_allclose(one[0], expected)
-    np.testing.assert_allclose(three[1], 2 * expected)
-    assert three.shape == (3, 2, 3)
-    assert not three[2].any()
 
 
 def test_one_training_view_is_not_enough(where, tmp_path):

@@ -9,12 +9,12 @@ import torch
 
 from gibench.baselines.geometry_aware_feature_aggregation.network import (
     FULL,
-    GEOMETRY,
     MINI,
     GeometryAware,
     Size,
 )
-from gibench.baselines.geometry_aware_feature_aggregation.shading import (
+from gibench.baselines.image_to_image.shading import (
+    GEOMETRY,
     brightness,
     demodulated,
     indirect,

@@ -1,0 +1,107 @@
+"""Indirect light by a network that knows neither how bright a room is, nor how large, nor what its surfaces reflect.
+
+Direct light is divided by albedo, and what the network says is multiplied by it (Gai, Wang & Li, Geometry-Aware Global
+Feature Aggregation for Real-Time Indirect Illumination, section 3.1). They learn from random exposures that a brighter
+room is the same room (section 3.3); here light is also divided by its own mean, so that it is so for any network, and
+its numbers stay in the range that it was trained in. Lengths are divided by the mean depth.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor, nn
+
+from gibench.baselines.image_to_image.frames import Images
+from gibench.baselines.training.codes import Exponential
+
+CHANNELS = ("direct_diffuse", "albedo", "normal", "position", "depth")
+"""Of a frame, what a network is given of it."""
+
+GEOMETRY = 7
+"""Channels of the geometry: position 3, normal 3, depth 1."""
+
+LIGHT = 2
+"""Of the light, in each colour: direct light over albedo, and albedo."""
+
+DARKEST = 0.01
+"""Added to albedo before anything is divided by it: black surfaces reflect nothing, and nothing is what they get."""
+
+OUTPUT = Exponential(largest=1e4, smallest=1e-6)
+"""Of indirect light over albedo, in units of the mean direct light."""
+
+
+def demodulated(radiance: Tensor, albedo: Tensor) -> Tensor:
+    """Radiance over albedo: light, without the texture that it falls on."""
+    return radiance / (albedo + DARKEST)
+
+
+def remodulated(light: Tensor, albedo: Tensor) -> Tensor:
+    """The inverse of `demodulated`, to the last bits."""
+    return light * (albedo + DARKEST)
+
+
+def brightness(direct: Tensor) -> Tensor:
+    """(…, 1, 1, 1): mean of direct light over albedo (…, 3, H, W), all colours together; 1 where there is none."""
+    mean = direct.mean(dim=(-3, -2, -1), keepdim=True)
+    return torch.where(mean > 0, mean, 1)
+
+
+def geometry(images: Images) -> Tensor:
+    """(…, GEOMETRY, H, W) of images in camera space, lengths in units of the mean depth of what is hit."""
+    depth = images["depth"]
+    hit = (depth > 0).sum(dim=(-3, -2, -1), keepdim=True)
+    unit = depth.sum(dim=(-3, -2, -1), keepdim=True) / hit.clamp(min=1)
+    unit = torch.where(unit > 0, unit, 1)
+    return torch.cat([images["position"] / unit, images["normal"], depth / unit], dim=-3)
+
+
+@dataclass(frozen=True, eq=False)
+class Inputs:
+    """What a network is given of frames. light: (N, LIGHT, 3, H, W), compressed direct light over albedo, and albedo.
+
+    geometry: (N, GEOMETRY, H, W). unit: (N, 1, 1, 1), of the light. albedo: (N, 3, H, W).
+    """
+
+    light: Tensor
+    geometry: Tensor
+    unit: Tensor
+    albedo: Tensor
+
+    @staticmethod
+    def of(direct: Tensor, albedo: Tensor, geometry: Tensor, unit: Tensor | None = None) -> Inputs:
+        """direct: direct diffuse radiance (N, 3, H, W), ≥ 0. unit: `brightness` unless it is given."""
+        light = demodulated(direct, albedo)
+        unit = brightness(light) if unit is None else unit
+        return Inputs(torch.stack([torch.log1p(light / unit), albedo], dim=1), geometry, unit, albedo)
+
+    def radiance(self, code: Tensor) -> Tensor:
+        """What a network says, (N, 3, H, W), as indirect diffuse radiance: finite and ≥ 0."""
+        return remodulated(OUTPUT.decode(code) * self.unit, self.albedo)
+
+
+def indirect(network: nn.Module, direct: Tensor, albedo: Tensor, geometry: Tensor) -> Tensor:
+    """Indirect diffuse radiance (N, 3, H, W), finite and ≥ 0.
+
+    network: of (light, geometry) as in `Inputs`, gives logarithms. direct: direct diffuse radiance (N, 3, H, W), ≥ 0.
+    geometry: (N, GEOMETRY, H, W).
+    """
+    inputs = Inputs.of(direct, albedo, geometry)
+    return inputs.radiance(network(inputs.light, inputs.geometry))
+
+
+class Concatenated(nn.Module):
+    """An image-to-image network of LIGHT · 3 + GEOMETRY channels that is given them all, side by side."""
+
+    INPUTS = 3 * LIGHT + GEOMETRY
+
+    def __init__(self, network: nn.Module) -> None:
+        """network: from INPUTS channels to 3."""
+        super().__init__()
+        self.network = network
+
+    def forward(self, light: Tensor, geometry: Tensor) -> Tensor:
+        """As a network of `indirect`."""
+        code: Tensor = self.network(torch.cat([light.flatten(1, 2), geometry], dim=1))
+        return code
