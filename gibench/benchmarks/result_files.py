@@ -3,6 +3,7 @@
 RESULTS/run.json                    track, preset, scenes, machines, and what every command did
 RESULTS/scenes/reference/           the dataset of the frames on the paths; scenes/reference-again: the same frames with
                                     independent samples; scenes/training: that of the views
+RESULTS/scenes/panoramas/           environments of rooms that light views to train on
 RESULTS/scenes/sites/room-000000/   the files of a room that methods may see: without any frame
 RESULTS/bakes/room-000000/          what methods prepared; bakes/rooms: what they trained on rooms
 RESULTS/results/<id>.json           a result, never changed once it is written
@@ -78,6 +79,11 @@ class RunFolder:
     def bakes(self, scene: str) -> Path:
         """Of a scene, shared by all methods; of "rooms" what is trained on rooms."""
         return self.root / "bakes" / scene
+
+    @property
+    def panoramas(self) -> Path:
+        """Environments that light views to train on, beside those that ship."""
+        return self.root / "scenes" / "panoramas"
 
     def site(self, scene: str) -> Path:
         """Files of a scene that methods may see."""

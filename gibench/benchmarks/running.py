@@ -36,7 +36,8 @@ SPENT = ("scenes", "prepare", "render", "score")
 class State:
     """How far a run is, for whoever watches.
 
-    record: of the result that has just been written. training: what a training on rooms that has just ended took.
+    panoramas: how many of the rooms that light views are there, and of how many. record: of the result that has just
+    been written. training: what a training on rooms that has just ended took.
     """
 
     done: int = 0
@@ -45,6 +46,7 @@ class State:
     record: dict[str, Any] | None = None
     training: dict[str, Any] | None = None
     scenes: Progress | None = None
+    panoramas: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True)
@@ -91,6 +93,7 @@ class Run:
         for which in ("reference", "reference-again"):
             self._make(which)
         if any(found.method.channels or found.method.trains for found, _ in order.methods):
+            self._make_panoramas()
             self._make("training")
         self.spent["scenes"] += time.perf_counter() - began
         self.scenes = [s for s in scenes_in(*self.folder.references) if s.room < order.room_count]
@@ -104,9 +107,17 @@ class Run:
             "track": self.order.track.id,
             "preset": self.order.preset,
             "warmup": size.warmup,
-            "training": {} if size.training is None else size.recipe("training", scenes=scenes).identity(),
+            "training": self._training_identity(),
             "reference": size.recipe("reference", scenes=scenes).identity(),
         }
+
+    def _training_identity(self) -> dict[str, Any]:
+        """Of the views to train on. Panoramas count by what they are made from: they need not be there yet."""
+        size = self.order.size
+        if size.training is None:
+            return {}
+        identity = size.recipe("training", scenes=self.order.scenes).identity()
+        return identity if size.panoramas is None else {**identity, "panoramas": size.panoramas.model_dump()}
 
     def _check_identity(self) -> None:
         if not self.folder.run_file.exists():
@@ -155,6 +166,27 @@ class Run:
         self.before = list(self.run["runs"])
         self.keep_record(ended=False)
 
+    def _make_panoramas(self) -> None:
+        """Make the environments of rooms that light views to train on, those that are not there yet."""
+        wanted = self.order.size.panoramas
+        if wanted is None:
+            return
+        from gibench.datasets.environment_panoramas import make_environments
+
+        def tell(done: int, of: int) -> None:
+            self.state.panoramas = (done, of)
+            self.on_state(self.state)
+
+        make_environments(
+            self.folder.panoramas,
+            count=wanted.count,
+            seed=wanted.seed,
+            spp=wanted.spp,
+            variant=self.facts["variant"],
+            on_done=tell,
+        )
+        self.state.panoramas = None
+
     def _make(self, which: Any) -> None:
         order = self.order
         rooms = order.room_count
@@ -164,7 +196,8 @@ class Run:
             from gibench.datasets.manifest import read_manifest
 
             rooms = max(rooms, int(read_manifest(manifest.parent)["recipe"]["rooms"]))
-        recipe = order.size.recipe(which, rooms, order.scenes)
+        panoramas = None if order.size.panoramas is None else self.folder.panoramas
+        recipe = order.size.recipe(which, rooms, order.scenes, panoramas)
 
         def tell(progress: Progress) -> None:
             self.state.scenes = progress

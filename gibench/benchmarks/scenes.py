@@ -11,6 +11,7 @@ import hashlib
 import json
 import os
 import shutil
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from itertools import groupby
@@ -23,9 +24,10 @@ from gibench.benchmarks.errors import ResultsError
 from gibench.datasets.errors import DatasetError
 from gibench.datasets.exr import decode
 from gibench.datasets.loading import Frame, open_dataset
-from gibench.datasets.manifest import room_record
+from gibench.datasets.manifest import recipe_of, room_record
 
 if TYPE_CHECKING:
+    from gibench.datasets.recipes import Recipe
     from gibench.rendering.lighting import Shot
 
 STILLS = "stills"
@@ -47,7 +49,8 @@ class SceneFiles:
 
     name: such as "room-000000". folder: with scene.xml and room.json. sha256: of all that decides what is seen.
     frames: those that are held out, stills first, then sequence by sequence. sequences: which of them follow each
-    other. halves: their references, once and once more. max_depth: scattering events of their paths.
+    other. halves: their references, once and once more. max_depth: scattering events of their paths. nearness: "near",
+    "far" or "" of each frame, as of `Recipe.nearness`; nothing where they are not told apart.
     """
 
     name: str
@@ -60,6 +63,7 @@ class SceneFiles:
     sequences: tuple[Stretch, ...]
     halves: tuple[tuple[Path, ...], tuple[Path, ...]]
     max_depth: int
+    nearness: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         """Number of frames that are held out."""
@@ -83,10 +87,18 @@ class SceneFiles:
         return None
 
     def tags(self, frame: int) -> tuple[str, ...]:
-        """What boards may be restricted to: the name of the sequence or `STILLS`, "indoor" or "outdoor" light."""
+        """What boards may be restricted to.
+
+        The name of the sequence, or `STILLS` and how near they are to the views to train on; "indoor" or "outdoor".
+        """
         stretch = self.stretch(frame)
         name = str(self.frames[frame].row.get("environment") or "")
-        return (STILLS if stretch is None else stretch.name, *indoor_or_outdoor(name))
+        near = self.nearness[frame] if self.nearness else ""
+        return (
+            STILLS if stretch is None else stretch.name,
+            *([near] if near else []),
+            *indoor_or_outdoor(name),
+        )
 
     def half(self, which: int, frame: int, *channels: str) -> dict[str, Any]:
         """Channels of one of the two renderings of a frame's reference, (H, W, C) by channel."""
@@ -125,6 +137,7 @@ def scenes_in(root: Path, again: Path) -> list[SceneFiles]:
         raise ResultsError(
             f"{root} has no frame: every room was rejected; choose another seed or other kinds"
         )
+    recipe = recipe_of(dataset.manifest)
     scenes = []
     for number, found in groupby(sorted(dataset, key=lambda f: (f.room, f.view)), key=lambda f: f.room):
         frames = tuple(found)
@@ -143,10 +156,15 @@ def scenes_in(root: Path, again: Path) -> list[SceneFiles]:
                     tuple(_inside(root, str(frame.row["file"])) for frame in frames),
                     tuple(_inside(again, str(frame.row["file"])) for frame in frames),
                 ),
-                max_depth=int(dataset.manifest["recipe"]["max_depth"]),
+                max_depth=recipe.max_depth,
+                nearness=_nearness(recipe, frames, room_record(root, number).get("given_cameras", 0)),
             )
         )
     return scenes
+
+
+def _nearness(recipe: Recipe, frames: Sequence[Frame], given: int) -> tuple[str, ...]:
+    return tuple(recipe.nearness(frame.view, given) for frame in frames) if recipe.trajectories else ()
 
 
 def refuse_files_outside(root: Path, scene: SceneFiles) -> None:

@@ -51,6 +51,17 @@ class Budget(_Strict):
     training: float | None = Field(None, gt=0)
 
 
+class Panoramas(_Strict):
+    """Panoramas of generated rooms that frames to train on are lit by, beside the maps that `training` names.
+
+    count: how many. seed, spp: see `environment_panoramas.make_environments`.
+    """
+
+    count: int = Field(ge=1, le=99999)
+    seed: int = Field(0, ge=0, lt=2**63)
+    spp: int = Field(16, ge=1, le=2**20)
+
+
 class MethodPlan(_Strict):
     """Settings of a method that a preset runs.
 
@@ -68,9 +79,9 @@ class Preset(_Strict):
     rooms: how many scenes. seed: decides the rooms. seeds: of the methods; those that are not trained run the first
     alone. warmup: frames rendered before the clock counts. room: keys of a recipe that training views and references
     share. training, reference: keys of the recipe of either; references are rendered twice, and without `training`
-    there is nothing to learn from. training_rooms, training_seed: of a track that trains on rooms of their own. knobs:
-    values for every method that has a knob of that name, so that all share what is baked. methods: by id; a method that
-    is not named runs at its defaults.
+    there is nothing to learn from. panoramas: of rooms, that light frames to train on too. training_rooms,
+    training_seed: of a track that trains on rooms of their own. knobs: values for every method that has a knob of that
+    name, so that all share what is baked. methods: by id; a method that is not named runs at its defaults.
     """
 
     rooms: int = Field(ge=1)
@@ -79,6 +90,7 @@ class Preset(_Strict):
     warmup: int = Field(ge=0)
     room: dict[str, Any]
     training: dict[str, Any] | None = None
+    panoramas: Panoramas | None = None
     training_rooms: int | None = Field(None, ge=1)
     training_seed: int | None = Field(None, ge=0)
     reference: dict[str, Any]
@@ -97,12 +109,15 @@ class Preset(_Strict):
         which: Literal["training", "reference", "reference-again"],
         rooms: int | None = None,
         scenes: Mapping[str, Any] | None = None,
+        panoramas: Path | None = None,
     ) -> Recipe:
         """The recipe of the training views, or of the frames that are held out, once or once more with other samples.
 
         All make the same rooms, for what decides a room and its cameras is in `room`; but where there are
         `training_rooms` the training views are of those. scenes: keys of a recipe that put scene files in the place of
-        rooms, those to train on excepted. Raises TrackError.
+        rooms, those to train on excepted. panoramas: the folder of those that light frames to train on too.
+
+        Raises TrackError.
         """
         values = {
             **self.room,
@@ -114,6 +129,9 @@ class Preset(_Strict):
             "splits": {"test": 1.0},
             **(scenes or {}),
         }
+        if which == "training" and panoramas is not None:
+            named = values.get("environments", ())
+            values["environments"] = [*([named] if isinstance(named, str) else named), str(panoramas)]
         if which == "training" and self.training_rooms is not None:
             apart = (*HELD_OUT, "path", "path_rooms", *(scenes or {}))
             values = {key: value for key, value in values.items() if key not in apart}
@@ -234,6 +252,10 @@ def _check_training(track: Track, preset: Preset, place: str) -> None:
                 f"{place}: training_seed is {preset.seed}, as seed is: the rooms to train on would be those that are "
                 "scored; choose another"
             )
+    if preset.panoramas is not None and (preset.training or {}).get("environments") is None:
+        raise TrackError(
+            f"{place}: panoramas needs training with environments, beside which they light frames"
+        )
     if preset.budget.training is not None and preset.budget.training >= preset.budget.prepare:
         raise TrackError(
             f"{place}: budget: training ({preset.budget.training:g} s) must be below prepare "

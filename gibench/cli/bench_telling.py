@@ -39,6 +39,8 @@ class Teller:
         elif (training := state.training) is not None:
             took = f"{duration(training['training'])}, with its views {duration(training['seconds'])}"
             self._line(f"trained on rooms: {training['method']} (seed {training['seed']}) {took}")
+        elif state.panoramas is not None and time.monotonic() - self._said >= QUIET_SECONDS:
+            self._line("panoramas of rooms: {}/{}".format(*state.panoramas))
         elif state.scenes is not None and time.monotonic() - self._said >= QUIET_SECONDS:
             scenes = state.scenes
             self._line(

@@ -5,14 +5,18 @@ from __future__ import annotations
 import json
 import tempfile
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gibench.datasets import pool
 from gibench.datasets.errors import FolderError, MakingError
 from gibench.datasets.files import as_json, write_whole
+from gibench.datasets.making import default_threads
 
 if TYPE_CHECKING:
     from gibench.generators.parts import Room
@@ -21,10 +25,10 @@ if TYPE_CHECKING:
 LANE = 2001
 """Of the seeds of these rooms, so that no dataset of the same seed has one of them."""
 
-FACE = 96
-"""Texels along the faces of the cube that is rendered, half as many again as the panorama has at the horizon."""
-
 HEIGHT = 128
+FACE = 96
+"""Texels along the faces of the cube that is rendered for HEIGHT rows, half as many again as the panorama has there."""
+
 MAX_DEPTH = 8
 
 RECORD = "environments.json"
@@ -39,61 +43,107 @@ def room_seed(seed: int) -> int:
 
 
 def make_environments(
-    out: Path, *, count: int, seed: int, spp: int, on_done: Callable[[int, int], None] | None = None
+    out: Path,
+    *,
+    count: int,
+    seed: int,
+    spp: int,
+    height: int = HEIGHT,
+    variant: str = "auto",
+    workers: int = 1,
+    on_done: Callable[[int, int], None] = lambda done, of: None,
 ) -> list[Path]:
-    """Render `count` panoramas of 256 × 128 texels into a folder, or those that are not there yet.
+    """Render `count` panoramas of 2·height × height texels into a folder, or those that are not there yet.
 
     Room i of the run shows from the place of its first camera, with its lamps and its daylight; a room that cannot be
     built is left out, and one more is taken. The same seed, number of samples, variant and versions give the same
-    pixels. Returns the files, OpenEXR, radiance in W·m⁻²·sr⁻¹.
+    pixels. workers: processes that render at the same time, which do not change them. on_done: told how many are there,
+    and of how many. Returns the files, OpenEXR, radiance in W·m⁻²·sr⁻¹.
 
     Raises FolderError for a folder of other settings or one that cannot be written, MakingError when most rooms fail.
     """
-    from gibench.generators.layouts.placement import RejectedRoom
-    from gibench.generators.rooms import sample_room
+    _claimed(out, {"seed": seed, "spp": spp, "height": height})
+    work = pool.Work(
+        partial(_ready, variant, default_threads(workers)), _Maker(out, seed=seed, spp=spp, height=height)
+    )
+    rejected: set[int] = set()
+    while True:
+        numbers = [number for number in range(count + len(rejected)) if number not in rejected]
+        left = [number for number in numbers if not _file(out, seed, number).is_file()]
+        if not left:
+            return [_file(out, seed, number) for number in numbers]
+        if len(rejected) > count + 10:
+            raise MakingError(f"{len(rejected)} of {len(numbers) + len(rejected)} rooms could not be built")
+        there = count - len(left)
 
-    _claimed(out, {"seed": seed, "spp": spp, "height": HEIGHT})
-    files: list[Path] = []
-    number = 0
-    while len(files) < count:
-        if number > 2 * count + 10:
-            raise MakingError(f"{number - len(files)} of {number} rooms could not be built")
-        file = out / f"room-{seed}-{number:05d}.exr"
-        if not file.is_file():
-            try:
-                room = sample_room(room_seed(seed), number, views=1)
-            except RejectedRoom:
-                number += 1
-                continue
-            _written(file, rendered_panorama(room, spp=spp, seed=seed))
-        files.append(file)
-        number += 1
-        if on_done is not None:
-            on_done(len(files), count)
-    return files
+        def told(number: int, rejection: str | None) -> None:
+            nonlocal there
+            if rejection is None:
+                there += 1
+                on_done(there, count)
+            else:
+                rejected.add(number)
+
+        listener = pool.Listener(lambda facts: None, lambda *message: None, told, lambda number: None)
+        pool.run_rooms(work, left, listener, workers=min(workers, len(left)))
 
 
-def rendered_panorama(room: Room, *, spp: int, seed: int) -> NDArray[np.float32]:
-    """What is seen in all directions from the first camera of a room: (128, 256, 3) radiance, laid out as `latlong`."""
+def _file(out: Path, seed: int, number: int) -> Path:
+    return out / f"room-{seed}-{number:05d}.exr"
+
+
+def _ready(variant: str, threads: int) -> None:
+    """Make a worker ready."""
+    from gibench.rendering import backend
+
+    backend.select_variant(variant)
+    backend.limit_threads(threads)
+
+
+@dataclass(frozen=True)
+class _Maker:
+    """The job that workers are given: the panorama of a room, or why there is none."""
+
+    out: Path
+    seed: int
+    spp: int
+    height: int
+
+    def __call__(self, number: int, report: pool.Report) -> str | None:
+        from gibench.generators.layouts.placement import RejectedRoom
+        from gibench.generators.rooms import sample_room
+
+        try:
+            room = sample_room(room_seed(self.seed), number, views=1)
+        except RejectedRoom as reason:
+            return str(reason)
+        panorama = rendered_panorama(room, spp=self.spp, seed=self.seed, height=self.height)
+        _written(_file(self.out, self.seed, number), panorama)
+        return None
+
+
+def rendered_panorama(room: Room, *, spp: int, seed: int, height: int = HEIGHT) -> NDArray[np.float32]:
+    """What is seen in all directions from the first camera of a room: (height, 2·height, 3) radiance, as `latlong`."""
     from gibench.generators.scene_files import write_room
     from gibench.rendering.scene import load_scene
 
     with tempfile.TemporaryDirectory(prefix="gibench-") as scratch:
         write_room(room, scratch, max_depth=MAX_DEPTH + 1)
         scene = load_scene(Path(scratch) / "scene.xml", share_kernels=True)
-    return panorama_from(scene, room.cameras[0].position, spp=spp, seed=seed + room.index)
+    return panorama_from(scene, room.cameras[0].position, spp=spp, seed=seed + room.index, height=height)
 
 
 def panorama_from(
-    scene: Scene, position: tuple[float, float, float], *, spp: int, seed: int
+    scene: Scene, position: tuple[float, float, float], *, spp: int, seed: int, height: int = HEIGHT
 ) -> NDArray[np.float32]:
-    """(128, 256, 3) denoised radiance from a place in a scene, all directions, from six views of a cube."""
+    """(height, 2·height, 3) denoised radiance from a place in a scene, all directions, from six views of a cube."""
     from gibench.rendering.camera import PinholeCamera
     from gibench.rendering.cubemap import FACES, cube_directions, to_latlong
     from gibench.rendering.render import render_frame
 
-    towards = cube_directions(FACE)
-    faces = np.empty((6, FACE, FACE, 3), dtype=np.float32)
+    face = height * FACE // HEIGHT
+    towards = cube_directions(face)
+    faces = np.empty((6, face, face, 3), dtype=np.float32)
     for number in range(len(FACES)):
         axis = towards[number].mean(axis=(0, 1))
         target = np.asarray(position) + axis
@@ -102,7 +152,7 @@ def panorama_from(
         color = render_frame(
             scene,
             camera,
-            resolution=(FACE, FACE),
+            resolution=(face, face),
             channels=("color",),
             spp=spp,
             seed=frame_seed,
@@ -110,9 +160,9 @@ def panorama_from(
             denoise=True,
         ).arrays["color"]
         # A camera that looks up or down has another side on top than the face.
-        x, y, _ = camera.project(np.asarray(position) + towards[number], (FACE, FACE))
+        x, y, _ = camera.project(np.asarray(position) + towards[number], (face, face))
         faces[number] = color[np.floor(y).astype(int), np.floor(x).astype(int)]
-    return to_latlong(faces, HEIGHT)
+    return to_latlong(faces, height)
 
 
 def _claimed(out: Path, settings: dict[str, Any]) -> None:

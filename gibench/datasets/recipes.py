@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from gibench.generators.cameras import PathPlan
     from gibench.generators.environments.files import EnvironmentFile
     from gibench.generators.imported.scene import ImportSettings
+    from gibench.generators.trajectories import Spread
 
 #: Environments that are no file: what `sample_room` would choose itself, sun and sky, or darkness outside.
 ENVIRONMENTS = ("auto", "sunsky", "none")
@@ -126,6 +127,18 @@ class Recipe(BaseModel):
         le=9999,
         description="an integer from 0 to 9999 (of the stills, the last ones, which are rendered with the path)",
     )
+    trajectories: int = Field(
+        0,
+        ge=0,
+        le=999,
+        description="an integer from 0 to 999 (walks that the stills lie on, the far ones excepted; 0: anywhere)",
+    )
+    far: int = Field(
+        0,
+        ge=0,
+        le=9999,
+        description="an integer from 0 to 9999 (of the held-out stills, the last ones, away from all trajectories)",
+    )
     path_moves: Moves = Field("camera", description='"camera", "light" or "both" (what moves along the path)')
     sequences: dict[Annotated[str, Field(min_length=1)], Sequence] = Field(
         {},
@@ -137,6 +150,12 @@ class Recipe(BaseModel):
     )
     environments: Annotated[tuple[str, ...], Field(strict=False)] = Field(
         (), description="a set of maps that ship, such as indoor or outdoor, a folder, or a list of maps"
+    )
+    rotations: int = Field(
+        0,
+        ge=0,
+        le=360,
+        description="an integer from 0 to 360 (turns that a map of a still may have, evenly around; 0: any)",
     )
     opened: Literal["none", "ceiling", "stage"] = Field(
         "none",
@@ -211,6 +230,10 @@ class Recipe(BaseModel):
             raise PydanticCustomError(
                 "lighting", 'environments is set, but not the lighting: set lighting to "environments"'
             )
+        if self.rotations and self.lighting != "environments":
+            raise PydanticCustomError(
+                "lighting", 'rotations is set, but not the lighting: set lighting to "environments"'
+            )
         moving = self.path_moves != "camera" or any(s.moves != "camera" for s in self.sequences.values())
         if moving and self.lighting == "own":
             raise PydanticCustomError(
@@ -236,6 +259,16 @@ class Recipe(BaseModel):
             )
         if self.held_out > self.views:
             raise PydanticCustomError("held_out", f"held_out is {self.held_out} of {self.views} views")
+        if self.far > self.held_out:
+            raise PydanticCustomError("far", f"far is {self.far} of {self.held_out} stills that are held out")
+        if self.far and not self.trajectories:
+            raise PydanticCustomError(
+                "far", "far is set, but there are no trajectories to be far from: set trajectories"
+            )
+        if self.trajectories and self.path != "stills" and not self.path_views:
+            raise PydanticCustomError(
+                "path", "trajectories are for stills, but the views lie on the path: leave path out"
+            )
         return self
 
     @model_validator(mode="after")
@@ -268,6 +301,23 @@ class Recipe(BaseModel):
         if self.path_views:
             return (PathPlan(self.path, self.path, self.path_views, self.path_moves),)
         return tuple(PathPlan(name, s.path, s.views, s.moves) for name, s in self.sequences.items())
+
+    @property
+    def spread(self) -> Spread | None:
+        """Where stills lie that are on trajectories, and away from them; None where they lie anywhere."""
+        from gibench.generators.trajectories import Spread
+
+        return Spread(self.trajectories, self.held_out, self.far) if self.trajectories else None
+
+    def nearness(self, view: int, given: int = 0) -> str:
+        """ "near" or "far" of a still that is held out, where they are told apart; else "".
+
+        given: as of `rendered_views`.
+        """
+        stills = given + self.views
+        if not self.trajectories or not stills - self.held_out <= view < stills:
+            return ""
+        return "near" if view < stills - self.far else "far"
 
     @property
     def path_frames(self) -> int:
@@ -338,7 +388,18 @@ class Recipe(BaseModel):
             del values["path_rooms"]
         if not self.sample_seed:
             del values["sample_seed"]
-        for key in ("path_moves", "sequences", "lighting", "environments", "opened", "gloss", "sampling"):
+        for key in (
+            "path_moves",
+            "sequences",
+            "trajectories",
+            "far",
+            "lighting",
+            "environments",
+            "rotations",
+            "opened",
+            "gloss",
+            "sampling",
+        ):
             if not values[key] or values[key] == type(self).model_fields[key].default:
                 del values[key]
         if self.environments:

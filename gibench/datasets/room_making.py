@@ -122,7 +122,7 @@ def sampled_room(recipe: Recipe, room: int) -> Room | ImportedRoom:
         aspect = recipe.resolution[0] / recipe.resolution[1]
         built = lit(built, AreaLights(light_space(built), aspect), recipe.moves())
     elif recipe.lighting == "environments":
-        built = lit(built, Environments(panoramas_of(recipe)), recipe.moves())
+        built = lit(built, Environments(panoramas_of(recipe), recipe.rotations), recipe.moves())
     return _opened(built, recipe.opened)
 
 
@@ -152,6 +152,7 @@ def _sampled(recipe: Recipe, room: int) -> Room | ImportedRoom:
             views=recipe.views,
             path=None if recipe.path == "stills" or recipe.path_views else recipe.path,
             sequences=recipe.plans(),
+            spread=recipe.spread,
         )
     from gibench.generators.rooms import sample_room
 
@@ -162,6 +163,7 @@ def _sampled(recipe: Recipe, room: int) -> Room | ImportedRoom:
         views=recipe.views,
         path=None if recipe.path == "stills" or recipe.path_views else recipe.path,
         sequences=recipe.plans(),
+        spread=recipe.spread,
         environment=None if recipe.environment == "auto" else recipe.environment,
         gloss=recipe.gloss,
     )

@@ -17,6 +17,7 @@ from scipy.interpolate import CubicSpline
 
 from gibench.errors import GibenchError
 from gibench.generators.parts import Camera, FloatArray
+from gibench.generators.trajectories import NoFarView, Spread, differences, spread_stills
 from gibench.generators.view_checks import View, judge
 from gibench.generators.visibility import Caster
 
@@ -107,10 +108,8 @@ def sample_stills(
     refused: Counter[str] = Counter()
     picked = count <= PICKED
     for _ in range(max(STILL_BATCHES, math.ceil(TRIED_PER_STILL * count / BATCH))):
-        candidates = [_candidate(rng, stage, xy) for xy in stage.points(rng, BATCH)]
-        views = stage.judge(candidates)
-        refused.update(v.reason for v in views if v.reason)
-        passed = [v for v in views if not v.reason]
+        passed, reasons = _candidates(rng, stage)
+        refused += reasons
         if not picked:
             chosen += [v.camera for v in passed[: count - len(chosen)]]
             passed = []
@@ -125,6 +124,34 @@ def sample_stills(
         if len(chosen) == count:
             return tuple(chosen), refused
     raise NoView("stills", refused)
+
+
+def sample_spread(
+    rng: np.random.Generator, stage: Stage, count: int, spread: Spread, beside: Sequence[Camera] = ()
+) -> tuple[tuple[Camera, ...], Counter[str]]:
+    """Draw `count` stills along walks, and away from these and from the cameras `beside`.
+
+    Returns them and how often candidates were refused, by reason. Raises NoView when the tries run out.
+    """
+
+    def candidates() -> tuple[list[Camera], Counter[str]]:
+        passed, refused = _candidates(rng, stage)
+        return [view.camera for view in passed], refused
+
+    try:
+        return spread_stills(
+            count, spread, lambda frames: sample_path(rng, stage, "walk", frames), candidates, beside
+        )
+    except NoFarView:
+        raise NoView(
+            "stills away from the trajectories", Counter({"near a trajectory": spread.far})
+        ) from None
+
+
+def _candidates(rng: np.random.Generator, stage: Stage) -> tuple[list[View], Counter[str]]:
+    """Views anywhere that pass, of a batch, and how many did not, by reason."""
+    views = stage.judge([_candidate(rng, stage, xy) for xy in stage.points(rng, BATCH)])
+    return [v for v in views if not v.reason], Counter(v.reason for v in views if v.reason)
 
 
 def _candidate(rng: np.random.Generator, stage: Stage, xy: FloatArray) -> Camera:
@@ -151,14 +178,8 @@ def camera_at(
 
 
 def _difference(camera: Camera, others: Sequence[Camera]) -> float:
-    """How much a camera differs from the most similar of others, in metres and radians together; 2 at most."""
-    look = np.subtract(camera.target, camera.position)
-    least = 2.0
-    for other in others:
-        cosine = np.dot(look, np.subtract(other.target, other.position)) / 4.0
-        angle = math.acos(float(np.clip(cosine, -1, 1)))
-        least = min(least, 0.5 * math.dist(camera.position, other.position) + angle)
-    return least
+    """How much a camera differs from the most similar of others, 2 at most; see `differences`."""
+    return float(differences(camera, others).min(initial=2.0))
 
 
 def sample_path(

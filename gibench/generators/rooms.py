@@ -16,6 +16,7 @@ from gibench.generators.cameras import (
     Stage,
     sample_path,
     sample_planned,
+    sample_spread,
     sample_stills,
 )
 from gibench.generators.daylight import sample_daylight
@@ -33,6 +34,7 @@ from gibench.generators.poses import stand
 from gibench.generators.shapes import merge
 from gibench.generators.shell_sampling import sample_shell
 from gibench.generators.still_life import scene as still_life
+from gibench.generators.trajectories import Spread
 from gibench.generators.visibility import RayCaster, Surface
 
 KINDS = tuple(FURNISH)
@@ -72,6 +74,7 @@ def sample_room(
     path: str | None = None,
     path_views: int = 0,
     sequences: Sequence[PathPlan] = (),
+    spread: Spread | None = None,
     environment: Environment | str | None = None,
     gloss: str = "any",
     **fixed: Any,
@@ -81,7 +84,8 @@ def sample_room(
     kind: of the room, one of ALL_KINDS; drawn from `kinds` if None. views: number of cameras. path: None for stills, or
     "walk", "orbit" or "eight" for one path of that many frames. path_views: cameras on the path in a room that has
     stills too: above 0 the `views` are stills, as without a path, and these come after them. sequences: the same for
-    any number of paths by name, in place of `path`. environment: what lies outside: "none", "sunsky", the path of an
+    any number of paths by name, in place of `path`. spread: of stills that lie on trajectories and away from them.
+    environment: what lies outside: "none", "sunsky", the path of an
     HDR panorama, or an Environment; drawn if None. gloss: "any", or "much" for the same rooms with polished floors and
     furniture, of which the cameras see at least the share `gloss.MUCH`; `Room.parameters` then says how much.
     fixed: arguments of `build_shell` that are not drawn, such as width=4.0.
@@ -106,7 +110,18 @@ def sample_room(
     for attempt in range(TRIES):
         try:
             room = _try_room(
-                seed, index, attempt, kind, views, path, sequences, environment, gloss, fixed, rejections
+                seed,
+                index,
+                attempt,
+                kind,
+                views,
+                path,
+                sequences,
+                spread,
+                environment,
+                gloss,
+                fixed,
+                rejections,
             )
         except RejectedRoom as refusal:
             rejections[refusal.reason] += 1
@@ -140,6 +155,7 @@ def _try_room(
     views: int,
     path: str | None,
     sequences: Sequence[PathPlan],
+    spread: Spread | None,
     environment: Environment | str | None,
     gloss: str,
     fixed: Mapping[str, Any],
@@ -157,6 +173,7 @@ def _try_room(
             views=views,
             path=path,
             sequences=sequences,
+            spread=spread,
             environment=environment,
         )
     shell = sample_shell(lane("shell"), kind, **fixed)
@@ -177,7 +194,9 @@ def _try_room(
     objects = _objects(plan, palette)
 
     stage = Stage(free, shell.height, _middles(plan), _caster(plan), len(shell.pieces))
-    if path is None:
+    if spread is not None:
+        cameras, refused = sample_spread(lane("cameras"), stage, views, spread)
+    elif path is None:
         cameras, refused = sample_stills(lane("cameras"), stage, views) if views else ((), Counter())
     else:
         cameras, refused = sample_path(lane("cameras"), stage, path, views)

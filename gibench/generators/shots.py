@@ -39,13 +39,22 @@ class Lights(Protocol):
 
 @dataclass(frozen=True)
 class Environments:
-    """One of several panoramas, turned at random."""
+    """One of several panoramas, turned at random.
+
+    rotations: how many turns a map may have that does not move, evenly around from none on; 0 for any.
+    """
 
     panoramas: Sequence[Panorama]
+    rotations: int = 0
 
     def one(self, rng: np.random.Generator, cameras: Sequence[Camera]) -> Lighting:
         """See `Lights`."""
-        return self.moving(rng, cameras[:1])[0]
+        lighting = self.moving(rng, cameras[:1])[0]
+        if not self.rotations:
+            return lighting
+        assert lighting.environment is not None
+        turn = 2 * math.pi * int(rng.integers(self.rotations)) / self.rotations
+        return Lighting(environment=replace(lighting.environment, rotation=turn))
 
     def moving(self, rng: np.random.Generator, cameras: Sequence[Camera]) -> tuple[Lighting, ...]:
         """See `Lights`. The environment turns."""

@@ -1,5 +1,6 @@
 import copy
 import math
+from collections import Counter
 
 import pytest
 
@@ -113,12 +114,32 @@ def test_the_presets_of_the_tracks_with_other_light_and_other_rooms():
         )
 
     assert sizes("moving-light") == ([2, 1000], [60 + 24 + 24] * 2, (128, 128))
+    assert sizes("relight") == ([2, 500], [40 + 24 + 24] * 2, (128, 128))
     assert sizes("unseen-rooms") == ([200, 4], [3 + 16] * 4 + [3] * 20, (192, 128))
     for name in ("moving-light", "relight", "unseen-rooms"):
         track = load_track(name)
         assert track.parts == ("full", "indirect")
         assert {"mae", "mse", "psnr", "ssim", "lpips_alex"} <= set(track.metrics)
         assert "warping_error" in track.sequence_metrics
+
+
+def test_relight_trains_on_real_and_rendered_maps_and_is_scored_near_and_far(tmp_path):
+    for name, maps, far in (("cpu", 15 + 100, 20), ("paper", 1000, 100)):
+        preset = load_track("relight").preset(name)
+        plain = preset.recipe("training")
+        assert preset.panoramas is not None
+        assert len(plain.environment_files()) + preset.panoramas.count == maps
+        assert plain.rotations == 3
+        (tmp_path / "room.exr").touch()
+        both = preset.recipe("training", panoramas=tmp_path)
+        assert both.environments == ("train", str(tmp_path))
+        assert preset.recipe("reference", panoramas=tmp_path) == preset.recipe("reference")
+        reference = preset.recipe("reference")
+        groups = Counter(reference.nearness(view) for view in reference.rendered_views())
+        assert groups["near"] == groups["far"] == far
+        assert not {m.name for m in plain.environment_files()} & {
+            m.name for m in reference.environment_files()
+        }
 
 
 ROOMS = {"prepare_on": "rooms"}
@@ -136,6 +157,7 @@ OWN = {"training_rooms": 3, "training_seed": 9}
             "the rooms to train on would be those that are scored; choose another",
         ),
         (ROOMS, OWN | {"training": None}, 'prepare_on = "rooms" needs training'),
+        ({}, {"panoramas": {"count": 1}}, "panoramas needs training with environments"),
         (
             {},
             {"budget": {"training": 60, "prepare": 60, "render": 5}},

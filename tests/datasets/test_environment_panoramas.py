@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from gibench.datasets import environment_panoramas
 from gibench.datasets.environment_panoramas import make_environments, panorama_from, room_seed
 from gibench.datasets.errors import FolderError
 from gibench.generators.environments.files import environment_files, read_environment
@@ -30,24 +29,18 @@ def test_every_direction_is_where_it_should_be():
     np.testing.assert_allclose(seen, expected, atol=0.03)
 
 
-@pytest.fixture
-def small(monkeypatch):
-    monkeypatch.setattr(environment_panoramas, "FACE", 16)
-    monkeypatch.setattr(environment_panoramas, "HEIGHT", 16)
-
-
-def test_the_same_command_continues_and_gives_the_same_pixels(tmp_path, small):
+def test_the_same_command_continues_and_gives_the_same_pixels(tmp_path):
     done = []
     files = make_environments(
-        tmp_path / "maps", count=1, seed=5, spp=1, on_done=lambda n, of: done.append((n, of))
+        tmp_path / "maps", count=1, seed=5, spp=1, height=16, on_done=lambda n, of: done.append((n, of))
     )
     content, when = files[0].read_bytes(), files[0].stat().st_mtime_ns
-    assert make_environments(tmp_path / "maps", count=1, seed=5, spp=1) == files
+    assert make_environments(tmp_path / "maps", count=1, seed=5, spp=1, height=16) == files
     assert files[0].stat().st_mtime_ns == when
     assert done == [(1, 1)]
     # One that was not finished has no file, and is made again.
     files[0].unlink()
-    make_environments(tmp_path / "maps", count=1, seed=5, spp=1)
+    make_environments(tmp_path / "maps", count=1, seed=5, spp=1, height=16)
     assert files[0].read_bytes() == content
     assert sorted(p.name for p in (tmp_path / "maps").iterdir()) == [
         "environments.json",
@@ -58,17 +51,17 @@ def test_the_same_command_continues_and_gives_the_same_pixels(tmp_path, small):
     assert all((read_environment(entry.path) > 0).any() for entry in listed)
 
 
-def test_a_folder_of_something_else_is_left_alone(tmp_path, small):
+def test_a_folder_of_something_else_is_left_alone(tmp_path):
     (tmp_path / "notes.txt").write_text("mine")
     with pytest.raises(FolderError, match="holds something else"):
-        make_environments(tmp_path, count=1, seed=0, spp=1)
+        make_environments(tmp_path, count=1, seed=0, spp=1, height=16)
     (tmp_path / "maps").mkdir()
     (tmp_path / "maps" / "environments.json").write_text('{"seed": 1, "spp": 1, "height": 16}')
     with pytest.raises(FolderError, match="panoramas of other settings"):
-        make_environments(tmp_path / "maps", count=1, seed=0, spp=1)
+        make_environments(tmp_path / "maps", count=1, seed=0, spp=1, height=16)
     (tmp_path / "maps" / "environments.json").write_text("{")
     with pytest.raises(FolderError, match="is damaged"):
-        make_environments(tmp_path / "maps", count=1, seed=0, spp=1)
+        make_environments(tmp_path / "maps", count=1, seed=0, spp=1, height=16)
 
 
 def test_no_dataset_has_the_rooms():

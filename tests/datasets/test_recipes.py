@@ -150,7 +150,25 @@ def test_stills_that_are_held_out_go_with_the_path():
 
 
 def test_recipes_without_held_out_stills_are_what_they_were():
-    assert not {"held_out", "path_rooms", "rendered"} & check_recipe({"views": 5}).identity().keys()
+    new = {"held_out", "path_rooms", "rendered", "trajectories", "far", "rotations"}
+    assert not new & check_recipe({"views": 5}).identity().keys()
+
+
+def test_stills_along_trajectories_and_far_from_them():
+    keys = {"views": 9, "held_out": 4, "trajectories": 2, "far": 1, "path": "walk", "path_views": 2}
+    recipe = check_recipe(keys)
+    assert [recipe.nearness(view) for view in range(11)] == [""] * 5 + ["near"] * 3 + ["far"] + [""] * 2
+    assert [recipe.nearness(view, given=2) for view in (6, 7, 10, 11)] == ["", "near", "far", ""]
+    assert check_recipe({"views": 9, "held_out": 4}).nearness(8) == ""
+    assert {"trajectories": 2, "far": 1}.items() <= recipe.identity().items()
+    with pytest.raises(RecipeError, match="far is 5 of 4 stills that are held out"):
+        check_recipe(keys | {"far": 5})
+    with pytest.raises(RecipeError, match="there are no trajectories to be far from: set trajectories"):
+        check_recipe(keys | {"trajectories": 0})
+    with pytest.raises(RecipeError, match="the views lie on the path: leave path out"):
+        check_recipe({"views": 9, "trajectories": 2, "path": "walk"})
+    with pytest.raises(RecipeError, match='rotations is set, but not the lighting: set lighting to "env'):
+        check_recipe({"rotations": 3})
 
 
 @pytest.mark.parametrize(

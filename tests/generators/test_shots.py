@@ -61,3 +61,13 @@ def test_the_frame_before_is_that_of_the_same_path():
     assert shot_before(made, 2) == shot_of(made, 1)
     assert shot_of(made, 1).lighting == made.lightings[1]
     assert shot_of(replace(made, lightings=()), 1).lighting == Lighting()
+
+
+def test_stills_have_one_of_a_few_rotations_but_maps_still_turn():
+    lights = replace(LIGHTS, rotations=3)
+    made = lit(room(*[""] * 60, "a", "a"), lights, {"a": "light"}).lightings
+    turns = {lighting.environment.rotation for lighting in made[:60]}
+    np.testing.assert_allclose(sorted(turns), [0, 2 * math.pi / 3, 4 * math.pi / 3])
+    assert len({lighting.environment for lighting in made[:60]}) == 3 * len(MAPS)
+    step = (made[61].environment.rotation - made[60].environment.rotation) % (2 * math.pi)
+    np.testing.assert_allclose(step, TURN)

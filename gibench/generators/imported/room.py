@@ -14,7 +14,14 @@ from xml.etree.ElementTree import ElementTree, SubElement, indent
 import numpy as np
 
 from gibench import gate
-from gibench.generators.cameras import NoView, PathPlan, sample_path, sample_planned, sample_stills
+from gibench.generators.cameras import (
+    NoView,
+    PathPlan,
+    sample_path,
+    sample_planned,
+    sample_spread,
+    sample_stills,
+)
 from gibench.generators.imported.changes import Change
 from gibench.generators.imported.errors import NoPlaceForCamera, SceneFileError
 from gibench.generators.imported.glb import write_scene_glb
@@ -23,6 +30,7 @@ from gibench.generators.imported.scene import ImportedScene
 from gibench.generators.imported.tree import Node
 from gibench.generators.parts import Camera, FloatArray
 from gibench.generators.scene_files import camera_records, lighting_records, sensor_element
+from gibench.generators.trajectories import Spread
 from gibench.rendering.lighting import Lighting
 from gibench.rendering.scene import OPENINGS
 
@@ -64,11 +72,12 @@ def import_room(
     path: str | None = None,
     path_views: int = 0,
     sequences: Sequence[PathPlan] = (),
+    spread: Spread | None = None,
 ) -> ImportedRoom:
     """Choose the cameras of a scene: its own, `views` stills, and a path of `path_views`, or several `sequences`.
 
-    With a path and no path_views the `views` lie on the path, as in `rooms.sample_room`. The cameras that are drawn
-    depend on the seed and the scene alone.
+    With a path and no path_views the `views` lie on the path, as in `rooms.sample_room`; spread: as there.
+    The cameras that are drawn depend on the seed and the scene alone.
 
     Raises SceneFileError where no view passes the checks, or where there is none at all.
     """
@@ -106,7 +115,9 @@ def import_room(
             raise NoPlaceForCamera(f"{scene.tree.file}: {problem}") from None
         try:
             draws = []
-            if views and path is None:
+            if spread is not None:
+                draws.append(sample_spread(_rng(seed, STILLS), stage, views, spread, cameras))
+            elif views and path is None:
                 draws.append(sample_stills(_rng(seed, STILLS), stage, views))
             elif views and path is not None:
                 draws.append(sample_path(_rng(seed, PATH), stage, path, views))

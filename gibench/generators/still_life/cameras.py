@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable
+from contextlib import suppress
 
 import numpy as np
 
+from gibench.generators.layouts.placement import RejectedRoom
 from gibench.generators.parts import Camera, FloatArray
+from gibench.generators.trajectories import NoFarView, Spread, spread_stills
 
 FOV = (math.radians(34), math.radians(50))
 ELEVATION = (math.radians(14), math.radians(52))
@@ -16,6 +20,13 @@ CLOSENESS = (0.88, 1.2)
 
 GOLDEN = math.pi * (3 - math.sqrt(5))
 """Between the azimuths of one still and the next, so that they lie far from each other, however many there are."""
+
+
+BATCH = 24
+"""Candidates for stills away from trajectories that are drawn at once."""
+
+SPREAD_TRIES = 20
+"""Sets of trajectories that are drawn before the still life is drawn again."""
 
 
 def sample_stills(
@@ -33,6 +44,26 @@ def sample_stills(
         )
         cameras.append(_camera(place, aim, fov))
     return tuple(cameras)
+
+
+def sample_spread(
+    rng: np.random.Generator, middle: FloatArray, radius: float, count: int, spread: Spread
+) -> tuple[Camera, ...]:
+    """Draw `count` stills along walks around the things, and away from these.
+
+    Raises RejectedRoom where the walks go all around, however often they are drawn.
+    """
+
+    def trajectory(frames: int) -> tuple[tuple[Camera, ...], Counter[str]]:
+        return sample_path(rng, middle, radius, "walk", frames), Counter()
+
+    def candidates() -> tuple[tuple[Camera, ...], Counter[str]]:
+        return sample_stills(rng, middle, radius, BATCH), Counter()
+
+    for _ in range(SPREAD_TRIES):
+        with suppress(NoFarView):
+            return spread_stills(count, spread, trajectory, candidates)[0]
+    raise RejectedRoom("no view away from the trajectories")
 
 
 def sample_path(

@@ -19,9 +19,10 @@ from gibench.generators.outside import GROUND, ground_material
 from gibench.generators.parts import Environment, Material, Mesh, Room, RoomObject
 from gibench.generators.poses import stand
 from gibench.generators.shapes import box, cylinder, merge, rounded_box
-from gibench.generators.still_life.cameras import sample_path, sample_stills
+from gibench.generators.still_life.cameras import sample_path, sample_spread, sample_stills
 from gibench.generators.still_life.figures import ANIMALS
 from gibench.generators.still_life.things import RING, THINGS, sample_thing
+from gibench.generators.trajectories import Spread
 
 KIND = "still-life"
 
@@ -58,6 +59,7 @@ def build_still_life(
     views: int,
     path: str | None,
     sequences: Sequence[PathPlan],
+    spread: Spread | None,
     environment: Environment | str | None,
 ) -> Room:
     """One try at a still life; arguments as of `rooms.sample_room`. lane: name and number → its random numbers.
@@ -91,7 +93,9 @@ def build_still_life(
     corners = np.concatenate([mesh.vertices for mesh in places])
     middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
     radius = float(np.linalg.norm(corners - middle, axis=1).max())
-    if path is None:
+    if spread is not None:
+        cameras = sample_spread(lane("cameras"), middle, radius, views, spread)
+    elif path is None:
         cameras = sample_stills(lane("cameras"), middle, radius, views)
     else:
         cameras = sample_path(lane("cameras"), middle, radius, path, views)
