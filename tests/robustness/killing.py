@@ -2,7 +2,8 @@
 
 ``python -m tests.robustness.killing --command make-dataset --kills 50`` kills the command's process, one of its workers
 or the whole group, fifty times; a seed that is printed decides how and when. What was whole before a kill is the same
-bytes after it, and what comes out in the end is what an undisturbed run makes.
+bytes after it, and what comes out in the end is what an undisturbed run makes. `--log FILE` keeps a line for each kill:
+what was killed, when, how many files were whole by then, and what was lost.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 
 import psutil
@@ -36,7 +38,44 @@ if __name__ == "__main__":
 """
 GIBENCH = (sys.executable, "-m", "gibench")
 TINY = ("--views", "2", "--resolution", "32x24", "--spp", "4", "--channels", "radiance,surface")
-BENCH = ("bench", "run", "--preset", "smoke", "--rooms", "1", "--no-score", "--methods")
+BENCH = ("bench", "run", "--preset", "smoke", "--no-score", "--track", "tiny.toml", "--methods")
+
+#: The smoke preset of a track of our own, in which rendering takes as long as starting processes does.
+TINY_TRACK = """
+id = "walkthrough"
+title = "Walkthrough"
+question = "Is anything lost?"
+varies = ["camera"]
+prepared = "for each room"
+source = []
+parts = ["full"]
+metrics = ["rmse"]
+sequence_metrics = []
+[presets.smoke]
+rooms = 1
+warmup = 1
+budget = { prepare = 600, render = 300 }
+[presets.smoke.room]
+resolution = [32, 32]
+views = 2
+path = "walk"
+path_views = 2
+kinds = ["bathroom"]
+[presets.smoke.training]
+spp = 4
+channels = ["radiance", "surface"]
+[presets.smoke.reference]
+spp = 4
+channels = ["radiance", "position", "shape_id", "motion"]
+[presets.smoke.knobs]
+texels = 4
+lightmap_spp = 16
+probes = 8
+probe_width = 32
+probe_spp = 4
+epochs = 20
+crop = 32
+"""
 
 
 @dataclass(frozen=True)
@@ -71,8 +110,8 @@ COMMANDS = {
     "make-dataset": Command(
         (*GIBENCH, "dataset", "make", "--rooms", "3", "--workers", "2", *TINY, "--out"), _frames
     ),
-    "bench": Command((*GIBENCH, *BENCH, "lightmap,path-traced,nearest-probe", "--out"), _results),
-    "training": Command((*GIBENCH, *BENCH, "elp", "--out"), _results),
+    "bench": Command((*GIBENCH, *BENCH, "lightmap,path-traced,nearest-probe", "--out"), _results, "scenes"),
+    "training": Command((*GIBENCH, *BENCH, "elp", "--out"), _results, "scenes"),
 }
 
 
@@ -92,7 +131,7 @@ def started(command: Command, root: Path) -> subprocess.Popen[str]:
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
-        cwd=Path(__file__).parents[2],
+        cwd=root.parent,
         env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
     )
 
@@ -125,45 +164,76 @@ def kill(process: subprocess.Popen[str], rng: random.Random) -> str:
     return who
 
 
-def killed(name: str, kills: int, seed: int, seconds: float = float("inf")) -> Outcome:
-    """Kill a command again and again; see the module. seconds: after which no further kill begins."""
+def killed(
+    name: str,
+    kills: int,
+    seed: int,
+    seconds: float = float("inf"),
+    told: Callable[[str], None] = lambda line: None,
+) -> Outcome:
+    """Kill a command again and again; see the module. seconds: after which no further kill begins. told: of each."""
     command, rng = COMMANDS[name], random.Random(f"{name}-{seed}")
     outcome = Outcome(0, [])
     end = time.monotonic() + seconds
     with tempfile.TemporaryDirectory(prefix="gibench-kills-") as scratch:
         undisturbed, root = Path(scratch) / "undisturbed", Path(scratch) / "killed"
+        (Path(scratch) / "tiny.toml").write_text(TINY_TRACK)
         duration = completed(command, undisturbed)
         expected = command.whole(undisturbed)
         names = _names(undisturbed)
-        in_a_row = 0
+        told(f"seed {seed}; undisturbed in {duration:.1f} s, {len(expected)} files that must not change")
+        in_a_row = rows = 0
+        shortened = 0.0
         while outcome.kills < kills and time.monotonic() < end:
+            given = bool(command.before) and rows % 4 > 0
+            if given and not root.exists():
+                shutil.copytree(undisturbed / command.before, root / command.before)
+                shortened = shortened or _timed_again(command, root, undisturbed)
             before = command.whole(root) if root.exists() else {}
             bytes_before = {file: _content(root, file) for file in before}
             process = started(command, root)
-            delay = rng.uniform(0, 1.1 * duration)
+            delay = rng.uniform(0, 1.1 * (shortened if given else duration))
             with contextlib.suppress(subprocess.TimeoutExpired):
                 process.communicate(timeout=delay)
             who = kill(process, rng)
             # Without its command everything must end soon. Without a worker, or with nothing to kill, it goes on.
             process.communicate(timeout=60 if who in ("command", "group") else 1200)
-            what = f"kill {outcome.kills} ({who} after {delay:.2f} s)"
-            if who:
-                outcome.kills += 1
-                in_a_row += 1
-                print(f"{name}: {what}", file=sys.stderr, flush=True)
+            lost_before = len(outcome.lost)
+            outcome.kills += bool(who)
+            in_a_row += bool(who)
+            what = f"kill {outcome.kills} of {kills}: {who} after {delay:.2f} s"
             after = _failed_by_kill_removed(command, root) if root.exists() else {}
             for file, content in bytes_before.items():
                 if file not in after or _content(root, file) != content:
                     outcome.lost.append(f"{what}: {file} was whole before and is not the same after")
+            if who:
+                lost = len(outcome.lost) - lost_before
+                told(
+                    f"{what}, {len(before)} files whole before and {len(after)} after, {lost or 'nothing'} lost"
+                )
             if not who or in_a_row == 5 or outcome.kills == kills:
                 in_a_row = 0
+                lost_before = len(outcome.lost)
                 completed(command, root)
                 if command.whole(root) != expected:
                     outcome.lost.append(f"{what}: the result differs from an undisturbed one")
                 if others := _names(root) ^ names:
                     outcome.lost.append(f"{what}: files of one run alone: {sorted(others)[:5]}")
+                same = len(outcome.lost) == lost_before
+                rows += 1
+                told(
+                    f"run to its end: {'as if undisturbed' if same else '; '.join(outcome.lost[lost_before:])}"
+                )
                 shutil.rmtree(root)
     return outcome
+
+
+def _timed_again(command: Command, root: Path, undisturbed: Path) -> float:
+    """Seconds of an undisturbed run that finds `Command.before` there. It is left as it was found."""
+    seconds = completed(command, root)
+    shutil.rmtree(root)
+    shutil.copytree(undisturbed / command.before, root / command.before)
+    return seconds
 
 
 def _failed_by_kill_removed(command: Command, root: Path) -> dict[str, str | None]:
@@ -193,12 +263,20 @@ def main() -> None:
     parser.add_argument("--kills", type=int, default=50)
     parser.add_argument("--seed", type=int, default=random.SystemRandom().randrange(2**32))
     parser.add_argument("--seconds", type=float, default=float("inf"))
+    parser.add_argument("--log", type=Path, help="a file that a line is added to for each kill")
     asked = parser.parse_args()
     lost = 0
     for name in asked.command or COMMANDS:
-        outcome = killed(name, asked.kills, asked.seed, asked.seconds)
-        print(f"{name}: {outcome.kills} kills, seed {asked.seed}, {len(outcome.lost)} losses", flush=True)
-        print(*outcome.lost, sep="\n", end="\n" if outcome.lost else "", flush=True)
+
+        def told(line: str, name: str = name) -> None:
+            line = f"{datetime.now().isoformat(timespec='seconds')} {name}: {line}"
+            print(line, flush=True)
+            if asked.log is not None:
+                with asked.log.open("a", encoding="utf-8") as log:
+                    print(line, file=log)
+
+        outcome = killed(name, asked.kills, asked.seed, asked.seconds, told)
+        told(f"{outcome.kills} kills, seed {asked.seed}, {len(outcome.lost)} losses")
         lost += len(outcome.lost)
     sys.exit(1 if lost else 0)
 
