@@ -9,14 +9,12 @@ error has the variance of (a − b)/2 = a − reference: metric(a, reference) is
 from __future__ import annotations
 
 import importlib.util
-import multiprocessing
 import os
 import warnings
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -30,10 +28,11 @@ from gibench.benchmarks.records import Scores
 from gibench.benchmarks.result_files import FORMAT, RunFolder
 from gibench.benchmarks.scenes import SceneFiles, scenes_in
 from gibench.benchmarks.track import CHANNELS_OF
+from gibench.datasets.errors import MakingError
 from gibench.datasets.exr import present_channels
 from gibench.datasets.files import as_json, write_whole
 from gibench.datasets.making import default_threads
-from gibench.datasets.pool import leave_signals_to_parent
+from gibench.datasets.pool import Listener, Report, Work, run_rooms
 from gibench.errors import GibenchError
 
 Image = NDArray[np.float32]
@@ -55,11 +54,13 @@ def score(
     *,
     more: Sequence[str] = (),
     on_progress: Callable[[int, int], None] = lambda done, of: None,
+    told: Callable[[str], None] = lambda remark: None,
 ) -> Scored:
     """Compute what is missing of the metrics of all results of a run.
 
-    more: metrics beside those of the track. on_progress: called with (done, of). Raises ResultsError,
-    UnknownMetricError, RunError where a process dies.
+    more: metrics beside those of the track. on_progress: called with (done, of). told: of a process that hangs, whose
+    result is scored again in a new one. Raises ResultsError, UnknownMetricError, RunError where a result takes two
+    processes with it.
     """
     run = folder.read_run()
     names = tuple(dict.fromkeys([*run["metrics"], *run["sequence_metrics"], *more]))
@@ -97,11 +98,18 @@ def score(
     wanting = [unit for unit in units if unit.missing()]
     on_progress(0, len(wanting))
     skipped: Counter[tuple[str, str]] = Counter()
-    for number, (reasons, problem) in enumerate(_each(wanting), 1):
+    finished = 0
+
+    def heard(unit: int, outcome: tuple[dict[str, str], str]) -> None:
+        nonlocal finished
+        reasons, problem = outcome
         skipped.update(reasons.items())
         if problem:
             problems.append(problem)
-        on_progress(number, len(wanting))
+        finished += 1
+        on_progress(finished, len(wanting))
+
+    _score_all(wanting, heard, told)
     return Scored(
         len(wanting), {name: (why, count) for (name, why), count in skipped.items()}, tuple(problems)
     )
@@ -121,29 +129,47 @@ def _unusable(names: Iterable[str]) -> dict[str, str]:
     return {}
 
 
-def _each(units: Sequence[_Unit]) -> Iterable[tuple[dict[str, str], str]]:
-    """Score units, in as many processes as there are cores."""
+def _score_all(
+    units: Sequence[_Unit],
+    heard: Callable[[int, tuple[dict[str, str], str]], None],
+    told: Callable[[str], None],
+) -> None:
+    """Score units, in as many processes as there are cores. heard: of each that is done. Raises RunError."""
     workers = min(default_threads(1), len(units))
     if workers <= 1:
-        yield from map(_scored, units)
+        for number, unit in enumerate(units):
+            heard(number, _scored(unit))
         return
-    context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_one_thread)
+    listener = Listener(
+        ready=lambda facts: None,
+        message=lambda unit, kind, content: None,
+        done=heard,
+        died=lambda unit: None,
+        told=lambda remark: told(f"{remark}; once more in a new one"),
+    )
     try:
-        for future in as_completed([pool.submit(_scored, unit) for unit in units]):
-            yield future.result()
-    except BrokenProcessPool:
-        raise RunError(
-            "a process that scores was killed (out of memory?): `gibench bench score` continues"
-        ) from None
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
+        run_rooms(_work(units), range(len(units)), listener, workers=workers)
+    except MakingError as problem:
+        raise RunError(str(problem)) from None
+
+
+def _work(units: Sequence[_Unit]) -> Work:
+    return Work(
+        setup=_one_thread,
+        job=partial(_scored_one, units),
+        place=tuple(unit.place for unit in units).__getitem__,
+        again="out of memory? `gibench bench score` continues",
+        rooms_per_worker=float("inf"),  # no renderer, which would grow
+    )
 
 
 def _one_thread() -> None:
     # One process a core: torch with all cores in each of them would be slower.
     os.environ["OMP_NUM_THREADS"] = "1"
-    leave_signals_to_parent()
+
+
+def _scored_one(units: Sequence[_Unit], unit: int, report: Report) -> tuple[dict[str, str], str]:
+    return _scored(units[unit])
 
 
 @dataclass(frozen=True)
@@ -157,6 +183,11 @@ class _Unit:
     parts: tuple[str, ...]
     unusable: dict[str, str]
     exposures: tuple[float, ...]
+
+    @property
+    def place(self) -> str:
+        """What is scored, for messages."""
+        return f"{self.scene.name}: reference" if self.id is None else f"result {self.id}"
 
     def read(self) -> dict[str, Any]:
         """The file so far."""

@@ -72,6 +72,11 @@ def tell_run(root: Path, report: Report) -> None:
     _row("harness", f"{duration(seconds['harness'])}, {share:.1f} % of the run")
 
 
+def remark(text: str) -> None:
+    """Print a remark beside what shows progress."""
+    say(text, err=True)
+
+
 def tell_scored(scored: Scored) -> None:
     """Say which metrics could not be computed, and why."""
     for name, (why, count) in scored.skipped.items():

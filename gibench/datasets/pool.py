@@ -1,4 +1,4 @@
-"""Worker processes that rooms are handed to, one at a time.
+"""Worker processes that rooms, or other numbered pieces of work, are handed to, one at a time.
 
 The process that hands out rooms loads no renderer: workers are spawned afresh, replaced after
 `ROOMS_PER_WORKER` rooms because a process that loads many scenes grows, and their death costs the room in
@@ -51,14 +51,18 @@ Report = Callable[[str, Any], None]
 
 @dataclass(frozen=True)
 class Work:
-    """What a worker does. Both functions are pickled by name.
+    """What a worker does. The functions are pickled by name.
 
     setup: runs once in each worker; what it returns reaches `Listener.ready`. job: does one room; it may
-    report on its way, and what it returns reaches `Listener.done`.
+    report on its way, and what it returns reaches `Listener.done`. place: a room as messages call it. again: what a
+    user does when a room takes two workers with it. rooms_per_worker: after which a fresh one takes its place.
     """
 
     setup: Callable[[], Any]
     job: Callable[[int, Report], Any]
+    place: Callable[[int], str] = "room {}".format
+    again: str = "lower --workers if memory ran out, then run the same command again to continue"
+    rooms_per_worker: float = ROOMS_PER_WORKER
 
 
 @dataclass(frozen=True)
@@ -76,9 +80,9 @@ class Listener:
 class _Worker:
     process: BaseProcess
     connection: Connection
+    rooms_left: float
     room: int | None = None
     ready: bool = False
-    rooms_left: int = ROOMS_PER_WORKER
     heard: float = field(default_factory=time.monotonic)
     computed: float = field(default_factory=time.monotonic)
     seconds: float = 0.0
@@ -119,12 +123,12 @@ def run_rooms(work: Work, rooms: Iterable[int], listener: Listener, *, workers: 
                 try:
                     if worker.hung:
                         worker.process.kill()
-                        listener.told(_place(worker) + worker.hung)
+                        listener.told(_whose(worker, work) + worker.hung)
                         raise EOFError
                     kind, content = worker.connection.recv()
                 except (EOFError, OSError):
                     crew.remove(worker)
-                    left.extendleft(_room_of_the_dead(worker, deaths, listener))
+                    left.extendleft(_room_of_the_dead(worker, work, deaths, listener))
                     continue
                 watch.heard(worker)
                 if _heard(worker, kind, content, listener):
@@ -185,8 +189,8 @@ def _processor_seconds(process: BaseProcess) -> float | None:
     return float(times.user + times.system)
 
 
-def _place(worker: _Worker) -> str:
-    return "a worker " if worker.room is None else f"room {worker.room}: its worker "
+def _whose(worker: _Worker, work: Work) -> str:
+    return "a worker " if worker.room is None else f"{work.place(worker.room)}: its worker "
 
 
 def _heard(worker: _Worker, kind: str, content: Any, listener: Listener) -> bool:
@@ -215,7 +219,7 @@ def _heard(worker: _Worker, kind: str, content: Any, listener: Listener) -> bool
     return True
 
 
-def _room_of_the_dead(worker: _Worker, deaths: set[int], listener: Listener) -> list[int]:
+def _room_of_the_dead(worker: _Worker, work: Work, deaths: set[int], listener: Listener) -> list[int]:
     """Rooms to do again after a worker's death: the one in hand, if any. Raises `MakingError` the second time."""
     worker.process.join()
     code = worker.process.exitcode or 0
@@ -233,8 +237,7 @@ def _room_of_the_dead(worker: _Worker, deaths: set[int], listener: Listener) -> 
         return []
     listener.died(worker.room)
     if worker.room in deaths:
-        hint = "lower --workers if memory ran out, then run the same command again to continue"
-        raise MakingError(f"room {worker.room}: two workers in a row were {how}; {hint}")
+        raise MakingError(f"{work.place(worker.room)}: two workers in a row were {how}; {work.again}")
     deaths.add(worker.room)
     return [worker.room]
 
@@ -245,7 +248,7 @@ def _hired(work: Work) -> _Worker:
     process = context.Process(target=_worker, args=(theirs, work), daemon=True)
     process.start()
     theirs.close()
-    return _Worker(process, ours)
+    return _Worker(process, ours, work.rooms_per_worker)
 
 
 def _worker(connection: Connection, work: Work) -> None:
@@ -272,7 +275,7 @@ def _worker(connection: Connection, work: Work) -> None:
             if isinstance(problem, SceneFileError):
                 connection.send(("bad scene", str(problem)))
             else:
-                connection.send(("failed", explained(problem, room)))
+                connection.send(("failed", explained(problem, room, work.place)))
 
 
 def leave_signals_to_parent() -> None:
@@ -290,9 +293,9 @@ def end_with_parent() -> None:
     os._exit(1)
 
 
-def explained(problem: Exception, room: int | None) -> str:
+def explained(problem: Exception, room: int | None, named: Callable[[int], str] = "room {}".format) -> str:
     """A failure in one line, with the room that it happened in."""
-    place = "" if room is None else f"room {room}: "
+    place = "" if room is None else f"{named(room)}: "
     if isinstance(problem, GibenchError):
         return f"{place}{problem}"
     if isinstance(problem, OSError) and problem.errno in (errno.ENOSPC, errno.EDQUOT):

@@ -1,13 +1,20 @@
 import json
+import os
+import shutil
+import signal
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from gibench import metrics
 from gibench.benchmarks import scoring
-from gibench.benchmarks.errors import ResultsError
+from gibench.benchmarks.errors import ResultsError, RunError
 from gibench.benchmarks.scenes import scenes_in
 from gibench.benchmarks.scoring import compute, half_parts, reference_parts, score
+from gibench.datasets import pool
 
 SEQUENCE = ["warping_error", "temporal_difference", "mabd"]
 
@@ -188,3 +195,50 @@ def test_what_json_lacks_is_none():
         "a": [1.0, None, None],
         "b": "x",
     }
+
+
+@dataclass
+class Stopped:
+    """Scoring whose process is stopped at one of the units, the first `times` times."""
+
+    job: Callable
+    tries: Path
+    times: int
+
+    def __call__(self, unit, report):
+        if unit == 1:
+            tries = self.tries.stat().st_size if self.tries.exists() else 0
+            self.tries.write_text("x" * (tries + 1))
+            if tries < self.times:
+                os.kill(os.getpid(), signal.SIGSTOP)
+        return self.job(unit, report)
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="needs SIGSTOP")
+@pytest.mark.parametrize("times", [1, 2])
+def test_a_process_that_hangs_is_given_up_and_its_result_scored_again(copy, tmp_path, monkeypatch, times):
+    monkeypatch.setattr(pool, "PATIENCE", 3)
+    monkeypatch.setattr(pool, "LOOK_SECONDS", 0.2)
+    monkeypatch.setattr(scoring, "default_threads", lambda workers: 2)
+    work_of = scoring._work
+
+    def work(units):
+        whole = work_of(units)
+        return replace(whole, job=Stopped(whole.job, tmp_path / "tries", times))
+
+    monkeypatch.setattr(scoring, "_work", work)
+    scores = {path.name: path.read_bytes() for path in copy.scores.iterdir()}
+    shutil.rmtree(copy.scores)
+    remarks = []
+    if times == 2:
+        with pytest.raises(
+            RunError, match=r"^result \w+: two workers in a row were given up, since each hung"
+        ):
+            score(copy, told=remarks.append)
+        monkeypatch.undo()
+        score(copy)
+    else:
+        assert score(copy, told=remarks.append).problems == ()
+    assert len(remarks) == times
+    assert "its worker hangs: it has not computed anything for 3 s; once more in a new one" in remarks[0]
+    assert {path.name: path.read_bytes() for path in copy.scores.iterdir()} == scores

@@ -81,10 +81,12 @@ crop = 32
 @dataclass(frozen=True)
 class Command:
     """words: without the folder, which comes last. whole: files that are never changed once they are there, with what
-    they must be in the end; None for content that differs from run to run."""
+    they must be in the end; None for content that differs from run to run. before: a folder that three rows of kills in
+    four find there already, so that more of them fall into what comes after it."""
 
     words: tuple[str, ...]
     whole: Callable[[Path], dict[str, str | None]]
+    before: str = ""
 
 
 def _sha256(path: Path) -> str:
