@@ -81,12 +81,12 @@ crop = 32
 @dataclass(frozen=True)
 class Command:
     """words: without the folder, which comes last. whole: files that are never changed once they are there, with what
-    they must be in the end; None for content that differs from run to run. before: a folder that three rows of kills in
-    four find there already, so that more of them fall into what comes after it."""
+    they must be in the end; None for content that differs from run to run. before: what four rows of kills in five
+    find there already, so that more of them fall into what comes after it."""
 
     words: tuple[str, ...]
     whole: Callable[[Path], dict[str, str | None]]
-    before: str = ""
+    before: tuple[str, ...] = ()
 
 
 def _sha256(path: Path) -> str:
@@ -112,8 +112,8 @@ COMMANDS = {
     "make-dataset": Command(
         (*GIBENCH, "dataset", "make", "--rooms", "3", "--workers", "2", *TINY, "--out"), _frames
     ),
-    "bench": Command((*GIBENCH, *BENCH, "lightmap,path-traced,nearest-probe", "--out"), _results, "scenes"),
-    "training": Command((*GIBENCH, *BENCH, "elp", "--out"), _results, "scenes"),
+    "bench": Command((*GIBENCH, *BENCH, "lightmap,path-traced", "--out"), _results, ("scenes", "run.json")),
+    "training": Command((*GIBENCH, *BENCH, "elp", "--out"), _results, ("scenes", "run.json")),
 }
 
 
@@ -187,10 +187,13 @@ def killed(
         in_a_row = rows = 0
         shortened = 0.0
         while outcome.kills < kills and time.monotonic() < end:
-            given = bool(command.before) and rows % 4 > 0
+            given = bool(command.before) and rows % 5 > 0
             if given and not root.exists():
-                shutil.copytree(undisturbed / command.before, root / command.before)
-                shortened = shortened or _timed_again(command, root, undisturbed)
+                _give(command, undisturbed, root)
+                if not shortened:
+                    shortened = completed(command, root)
+                    shutil.rmtree(root)
+                    _give(command, undisturbed, root)
             before = command.whole(root) if root.exists() else {}
             bytes_before = {file: _content(root, file) for file in before}
             process = started(command, root)
@@ -198,8 +201,9 @@ def killed(
             with contextlib.suppress(subprocess.TimeoutExpired):
                 process.communicate(timeout=delay)
             who = kill(process, rng)
-            # Without its command everything must end soon. Without a worker, or with nothing to kill, it goes on.
-            process.communicate(timeout=60 if who in ("command", "group") else 1200)
+            # Without its command everything must end: a worker that starts, when it is there. Without a worker, or with
+            # nothing to kill, it goes on.
+            process.communicate(timeout=300 if who in ("command", "group") else 1200)
             lost_before = len(outcome.lost)
             outcome.kills += bool(who)
             in_a_row += bool(who)
@@ -213,7 +217,7 @@ def killed(
                 told(
                     f"{what}, {len(before)} files whole before and {len(after)} after, {lost or 'nothing'} lost"
                 )
-            if not who or in_a_row == 5 or outcome.kills == kills:
+            if not who or in_a_row == 7 or outcome.kills == kills:
                 in_a_row = 0
                 lost_before = len(outcome.lost)
                 completed(command, root)
@@ -230,12 +234,14 @@ def killed(
     return outcome
 
 
-def _timed_again(command: Command, root: Path, undisturbed: Path) -> float:
-    """Seconds of an undisturbed run that finds `Command.before` there. It is left as it was found."""
-    seconds = completed(command, root)
-    shutil.rmtree(root)
-    shutil.copytree(undisturbed / command.before, root / command.before)
-    return seconds
+def _give(command: Command, undisturbed: Path, root: Path) -> None:
+    """Let a run find what an undisturbed one has made first."""
+    root.mkdir()
+    for name in command.before:
+        if (undisturbed / name).is_dir():
+            shutil.copytree(undisturbed / name, root / name)
+        else:
+            shutil.copy(undisturbed / name, root / name)
 
 
 def _failed_by_kill_removed(command: Command, root: Path) -> dict[str, str | None]:

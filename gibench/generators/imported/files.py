@@ -35,6 +35,7 @@ NEED_FILES = {
         "linearcurve",
         "bsplinecurve",
         "sdfgrid",
+        "hair",
         "ellipsoids",
         "ellipsoidsmesh",
     ),
@@ -168,6 +169,9 @@ def _without_texture(root: Node, texture: Node, parents: dict[int, Node]) -> Non
     for use in uses:
         parent = parents.get(id(use))
         if parent is None:
+            continue
+        if parent.type == "heightfield" and id(parent) in parents:
+            replaced(parents[id(parent)], parent, None)
             continue
         if parent.type in ("bumpmap", "normalmap"):
             inner = next(iter(parent.nodes("bsdf")), None)

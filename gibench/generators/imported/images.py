@@ -18,9 +18,9 @@ from gibench.generators.imported.changes import Note
 from gibench.generators.imported.errors import SceneFileError
 from gibench.generators.imported.files import NamedFile, named_files
 from gibench.generators.imported.reading import SceneTree
-from gibench.generators.imported.tree import Node, new
+from gibench.generators.imported.tree import Node, new, replaced
 from gibench.generators.imported.upgrading.rules import constant_color
-from gibench.generators.imported.upgrading.textures import FACTOR
+from gibench.generators.imported.upgrading.textures import COLORS_OF, FACTOR
 
 BANDS = {"r": 0, "g": 1, "b": 2, "a": 3}
 
@@ -33,7 +33,8 @@ EXR, EXR_NAMES = b"\x76\x2f\x31\x01", ("R", "G", "B", "A", "Y", "X", "Z", "RY", 
 def check_images(tree: SceneTree) -> None:
     """Raises SceneFileError, with the place in the scene, for an image that Mitsuba refuses or that is no light."""
     for file in named_files(tree):
-        if file.owner.tag not in ("texture", "emitter") or file.element.tag == "spectrum":
+        holds_image = file.owner.tag in ("texture", "emitter") or file.owner.type == "heightfield"
+        if not holds_image or file.element.tag == "spectrum":
             continue
         if not isinstance(file.source, Path):
             continue
@@ -88,7 +89,7 @@ def _check_size(where: str, path: Path, width: int, height: int) -> None:
 
 
 def _check_light(file: NamedFile) -> None:
-    image = _linear(Path(file.source))
+    image = linear(Path(file.source))
     if image is None:
         raise SceneFileError(
             f"{file.owner.where}: {Path(file.source).name} cannot be read as an image: get it again"
@@ -101,15 +102,18 @@ def _check_light(file: NamedFile) -> None:
         )
 
 
-def _linear(path: Path) -> NDArray[np.float32] | None:
-    """(H, W, 3) linear radiance of any image that Mitsuba reads."""
+def linear(path: Path, *, raw: bool = False) -> NDArray[np.float32] | None:
+    """(H, W, 3) linear values of any image that Mitsuba reads, None of another. raw: its numbers are linear already."""
     from gibench.rendering.backend import select_variant
 
     select_variant()
     import mitsuba as mi
 
     try:
-        bitmap = mi.Bitmap(str(path)).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False)
+        bitmap = mi.Bitmap(str(path))
+        if raw:
+            bitmap.set_srgb_gamma(False)
+        bitmap = bitmap.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False)
     except (RuntimeError, UnicodeDecodeError):
         return None
     return np.array(bitmap)
@@ -133,6 +137,36 @@ def made_images(tree: SceneTree, note: Note) -> None:
             color = constant_color(factor, 1.0)
             assert color is not None
             _multiply(tree, node, name, color, made, note)
+
+
+def plain_roughness(tree: SceneTree, note: Note) -> None:
+    """The texture of the roughness of a `roughplastic` of Mitsuba 0.6 becomes its mean: Mitsuba 3 has one number."""
+    by_id = {node.get("id"): node for node in tree.root.everything() if node.tag == "texture"}
+    for node in tree.root.everything():
+        part = node.property("alpha")
+        if node.tag != "bsdf" or node.type != "roughplastic" or not node.legacy or part is None:
+            continue
+        texture = by_id.get(part.get("id"), part) if part.tag == "ref" else part
+        if texture.tag != "texture":
+            continue
+        mean = _mean(tree, texture)
+        replaced(node, part, new("float", part, name="alpha", value=repr(round(mean, 6))))
+        note(node, f"the texture of a roughplastic's roughness is its mean, {mean:.3g}", loss=True)
+
+
+def _mean(tree: SceneTree, texture: Node) -> float:
+    """Of the values of a texture."""
+    name = texture.property("filename")
+    if texture.type == "bitmap" and name is not None:
+        image = linear(tree.located(name.get("value", ""), name.where), raw=texture.value("raw") == "true")
+        if image is not None and np.isfinite(image).all():
+            return float(image.mean(dtype=np.float64))
+    if texture.type == "checkerboard":
+        colors = [constant_color(texture.property(n), d) for n, d in COLORS_OF["checkerboard"].items()]
+        return float(np.mean([color for color in colors if color is not None]))
+    raise SceneFileError(
+        f"{texture.where}: no mean is known of this {texture.type or 'texture'} as a roughness: give a number"
+    )
 
 
 def _take_channel(
@@ -218,7 +252,7 @@ def as_png(content: bytes) -> bytes:
     with tempfile.TemporaryDirectory(prefix="gibench-") as scratch:
         file = Path(scratch) / "image"
         file.write_bytes(content)
-        values = _linear(file)
+        values = linear(file)
     if values is None:
         return _png(Image.new("RGB", (1, 1), (188, 188, 188)))
     shown = _encoded(np.clip(np.nan_to_num(values.astype(np.float64)), 0, 1))

@@ -20,9 +20,10 @@ from gibench.generators.imported.distance_grids import mesh_grids
 from gibench.generators.imported.errors import SceneFileError
 from gibench.generators.imported.files import destinations, named_files, settle_missing
 from gibench.generators.imported.films import DEFAULT_SIZE, film_of, whole_number
-from gibench.generators.imported.images import check_images, made_images
+from gibench.generators.imported.images import check_images, made_images, plain_roughness
 from gibench.generators.imported.mesh_files import check_meshes
 from gibench.generators.imported.obj_files import split_objs
+from gibench.generators.imported.old_shapes import curve_hair, mesh_height_fields
 from gibench.generators.imported.own_cameras import GivenCamera, cameras_of, read_camera_file
 from gibench.generators.imported.placing import place, placed_matrix, up_axis
 from gibench.generators.imported.reading import SceneTree, read_tree
@@ -165,6 +166,9 @@ def import_scene(file: Path, settings: ImportSettings | None = None) -> Imported
     missing = settle_missing(tree, note("files"), allow_missing=settings.allow_missing)
     check_images(tree)
     check_meshes(tree)
+    mesh_height_fields(tree, note("height_fields"))
+    curve_hair(tree, note("hair"))
+    plain_roughness(tree, note("roughness"))
     made_images(tree, note("images"))
     expand_instances(tree.root, note("instances"))
     name_everything(tree.root)

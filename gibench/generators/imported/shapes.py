@@ -8,7 +8,7 @@ from pathlib import Path
 from gibench.generators.imported.changes import Note
 from gibench.generators.imported.errors import SceneFileError
 from gibench.generators.imported.transforms import matrix_of
-from gibench.generators.imported.tree import Node, copied, new, replaced
+from gibench.generators.imported.tree import Node, copied, new, parents_of, replaced
 
 MOST_SHAPES = 100_000
 """In a scene, with the copies that instances stand for: a few kilobytes of instances of groups can ask for millions."""
@@ -19,6 +19,12 @@ def expand_instances(root: Node, note: Note) -> None:
 
     Raises SceneFileError for an instance of no group, and for more than MOST_SHAPES shapes.
     """
+    for node in [node for node in root.everything() if node.type == "merge" and node.tag == "shape"]:
+        # It makes one mesh of many, which is no one's concern but Mitsuba's.
+        parent = parents_of(root)[id(node)]
+        at = list(parent).index(node)
+        parent[at : at + 1] = node.nodes("shape")
+        note(node, "the shapes of a merge stand beside the others")
     groups = {node.get("id", ""): node for node in root.nodes("shape") if node.type == "shapegroup"}
     instances = [node for node in root.nodes("shape") if node.type == "instance"]
     group_of = {id(node): _group(node, groups) for node in instances}

@@ -9,7 +9,7 @@ import pytest
 
 from gibench.generators.imported.errors import SceneFileError
 from gibench.generators.imported.films import Film, film_of
-from gibench.generators.imported.upgrading import RULES
+from gibench.generators.imported.upgrading import RULES, thin_layers
 from gibench.rendering.backend import select_variant
 
 from .files import SQUARE, numbers, one, upgraded
@@ -604,3 +604,80 @@ def test_the_texture_of_a_normal_map(tmp_path):
 def test_what_is_left_out_or_replaced_may_be_unknown(tmp_path, tag):
     root, _ = upgraded(tmp_path, f'<{tag} type="nobody_knows"><sampler type="ldsampler"/></{tag}>{SQUARE}')
     assert one(root, "shape").type == "rectangle"
+
+
+def test_the_intent_of_a_colour_is_left_out(tmp_path):
+    body = shape_of(
+        '<bsdf type="diffuse"><rgb name="reflectance" intent="reflectance" value=".1 .2 .3"/></bsdf>'
+    )
+    root, changes = upgraded(tmp_path, body)
+    assert rules_of(changes) == {"intents"}
+    assert one(root, "rgb").get("intent") is None
+
+
+@pytest.mark.parametrize(
+    ("texture", "color"), [("wireframe", (0.1, 0.2, 0.3)), ("curvature", (0.5, 0.5, 0.5))]
+)
+@pytest.mark.parametrize("id", ["", ' id="t"'])
+def test_drawn_lines_are_plain(tmp_path, texture, color, id):
+    inside = f'<texture name="reflectance" type="{texture}"{id}><rgb name="interiorColor" value=".1 .2 .3"/></texture>'
+    root, changes = upgraded(tmp_path, shape_of(f'<bsdf type="diffuse">{inside}</bsdf>'))
+    assert "drawn_lines" in rules_of(changes)
+    found = [node for node in root.everything() if node.tag == "rgb"]
+    assert {tuple(numbers(node.get("value"))) for node in found} == {color}
+    loads(root)
+
+
+def test_a_coat_inside_of_another(tmp_path):
+    inner = '<bsdf type="coating"><bsdf type="diffuse"/></bsdf>'
+    root, _ = upgraded(tmp_path, shape_of(f'<bsdf type="coating">{inner}</bsdf>'))
+    assert one(root, "bsdf").type == "plastic"
+
+
+def test_scattering_once_by_its_closed_forms():
+    none, some = np.zeros(3), np.full(3, 2.0)
+    thick = thin_layers.layer(some, 2 * some, 1e5)
+    # Of the albedo, ∫∫ xy / (x + y) over the unit square, which is 2/3 (1 − ln 2).
+    np.testing.assert_allclose(thick[0], 0.5 * 2 / 3 * (1 - np.log(2)), rtol=1e-5)
+    np.testing.assert_allclose(thick[1:], 0, atol=1e-4)
+    np.testing.assert_allclose(thin_layers.layer(none, none, 1), [none, none, none + 1], atol=1e-12)
+    # A thin layer scatters 2 τ of diffuse light, half of it back.
+    back, through, straight = thin_layers.layer(some, some, 1e-6)
+    np.testing.assert_allclose(back, through, rtol=1e-2)
+    np.testing.assert_allclose(1 - straight, back + through, rtol=1e-2)
+    for thickness in (0.1, 1, 10):
+        assert np.all(sum(thin_layers.layer(some, some, thickness)) < 1)  # what scatters twice is lost
+
+
+@pytest.mark.parametrize(
+    ("settings", "kind"),
+    [
+        ("", "mask"),
+        ('<float name="thickness" value="1000"/>', "principledthin"),
+        ('<string name="material" value="Ketchup"/>', "mask"),
+        ('<spectrum name="sigmaS" value="0"/><spectrum name="sigmaA" value="0"/>', "mask"),
+        ('<spectrum name="sigmaT" value="8"/><rgb name="albedo" value=".9 .5 .1"/>', "principledthin"),
+    ],
+)
+def test_scattering_layers(tmp_path, settings, kind):
+    root, changes = upgraded(tmp_path, shape_of(f'<bsdf type="hk">{settings}<phase type="hg"/></bsdf>'))
+    assert "scattering_layers" in rules_of(changes)
+    assert next(node for node in root.everything() if node.tag == "bsdf").type == kind
+    loads(root)
+
+
+def test_a_scattering_layer_of_nothing_known(tmp_path):
+    with pytest.raises(SceneFileError, match=r"scene\.xml:2: hk: nothing is known of the material 'mud'"):
+        upgraded(tmp_path, shape_of('<bsdf type="hk"><string name="material" value="mud"/></bsdf>'))
+    with pytest.raises(SceneFileError, match="negative"):
+        upgraded(tmp_path, shape_of('<bsdf type="hk"><float name="thickness" value="-1"/></bsdf>'))
+
+
+def test_woven_cloth_has_the_mean_colour_of_its_yarns(tmp_path):
+    yarns = '<rgb name="warp_kd" value=".2 .4 .6"/><spectrum name="weft_kd" value="0"/><float name="ks" value="1"/>'
+    root, changes = upgraded(
+        tmp_path, shape_of(f'<bsdf type="irawan"><string name="filename" value="a.wv"/>{yarns}</bsdf>')
+    )
+    assert "woven_cloth" in rules_of(changes)
+    np.testing.assert_allclose(numbers(one(root, "rgb").get("value")), (0.1, 0.2, 0.3))
+    assert one(root, "bsdf").type == "diffuse"

@@ -20,6 +20,7 @@ from gibench.generators.imported.upgrading import (
     properties,
     surfaces,
     textures,
+    thin_layers,
 )
 from gibench.generators.imported.upgrading.rules import Rule
 
@@ -48,6 +49,7 @@ LEGACY: tuple[Rule, ...] = (
     names.rotation_axes,
     names.animations,
     names.gone_settings,
+    colors.intents,
     colors.srgb_tags,
     colors.scalar_spectra,
     colors.black_bodies,
@@ -56,6 +58,8 @@ LEGACY: tuple[Rule, ...] = (
     surfaces.ward,
     surfaces.rough_diffuse,
     surfaces.mixtures,
+    thin_layers.scattering_layers,
+    thin_layers.woven_cloth,
     surfaces.coatings,
     surfaces.translucent,
     surfaces.normal_maps,
@@ -64,6 +68,7 @@ LEGACY: tuple[Rule, ...] = (
     textures.bitmap_gamma,
     textures.texture_lookups,
     textures.grid_textures,
+    textures.drawn_lines,
     lights.sun_and_sky,
     lights.gone_lights,
     properties.unknown_properties,

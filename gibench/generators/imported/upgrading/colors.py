@@ -15,6 +15,13 @@ from gibench.generators.imported.upgrading.rules import constant_color, number, 
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
 
+def intents(root: Node, note: Note) -> None:
+    """What a colour is for (`intent`) is left out: where it stands tells."""
+    for node in old(root):
+        if node.tag in ("rgb", "srgb", "spectrum") and node.attrib.pop("intent", None) is not None:
+            note(node, "the intent of a colour is left out")
+
+
 def srgb_tags(root: Node, note: Note) -> None:
     """`<srgb>` becomes linear `<rgb>`."""
     for node in old(root):

@@ -111,7 +111,7 @@ def rough_diffuse(root: Node, note: Note) -> None:
 
 def coatings(root: Node, note: Note) -> None:
     """A coat over a diffuse surface becomes (rough) plastic; over anything else it is left out."""
-    for node in plugins(root, "bsdf", "coating", "roughcoating"):
+    for node in reversed(plugins(root, "bsdf", "coating", "roughcoating")):  # a coat inside of another first
         inner = next(iter(node.nodes("bsdf", "ref")), None)
         if inner is None:
             raise SceneFileError(f"{node.where}: {node.type} coats nothing: put a <bsdf> inside")

@@ -141,6 +141,27 @@ def texture_lookups(root: Node, note: Note) -> None:
             note(node, "uscale, vscale, uoffset and voffset are to_uv")
 
 
+def drawn_lines(root: Node, note: Note) -> None:
+    """`wireframe` becomes the colour between its lines, `curvature` grey: nothing draws either on a surface."""
+    by_use = parents_of(root)
+    for node in plugins(root, "texture", "wireframe", "curvature"):
+        color = constant_color(node.property("interior_color"), 0.5) if node.type == "wireframe" else None
+        flat = rgb(node, "value", color or (0.5, 0.5, 0.5))
+        what = f"{node.type} is the plain colour {flat.get('value')}"
+        parent = by_use[id(node)]
+        if node.get("id"):  # others may refer to it, and to a texture alone
+            become(
+                node,
+                "checkerboard",
+                rgb(node, "color0", color or (0.5,) * 3),
+                rgb(node, "color1", color or (0.5,) * 3),
+            )
+        else:
+            flat.set("name", node.get("name", ""))
+            replaced(parent, node, flat)
+        note(node, what, loss=True)
+
+
 def grid_textures(root: Node, note: Note) -> None:
     """`gridtexture` becomes `checkerboard`, `vertexcolors` a mesh attribute."""
     for node in plugins(root, "texture", "gridtexture", "vertexcolors"):
