@@ -6,16 +6,21 @@ import hashlib
 import importlib.metadata
 import json
 import multiprocessing
+import threading
 from collections.abc import Mapping
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
+from multiprocessing.connection import Connection
 from typing import Any
 
 from gibench.benchmarks.errors import RunError
+from gibench.datasets.pool import end_with_parent, leave_signals_to_parent
+from gibench.errors import GibenchError
 
 #: Packages whose version changes times or pixels, beside those that the renderer names itself.
 PACKAGES = ("numpy", "torch")
+
+#: Seconds that a process which loads a renderer and looks around may take.
+LONGEST_LOOK = 600.0
 
 #: What decides whether two times may be compared. The rest (memory, kernel of the system) is for people.
 COMPARED = ("cpu", "cores", "threads", "gpu", "variant", "versions")
@@ -27,11 +32,33 @@ def examine(variant: str, threads: int) -> dict[str, Any]:
     A process of its own looks, since loading a renderer may abort it. Raises RunError or what `select_variant` does.
     """
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(1, mp_context=context) as pool:
-        try:
-            return pool.submit(_facts, variant, threads).result()
-        except BrokenProcessPool:
-            raise RunError("the renderer ends its process: `gibench doctor` shows why") from None
+    ours, theirs = context.Pipe()
+    process = context.Process(target=_look, args=(theirs, variant, threads), daemon=True)
+    process.start()
+    theirs.close()
+    try:
+        if not ours.poll(LONGEST_LOOK):
+            raise RunError(f"the renderer has not started within {LONGEST_LOOK:g} s: see `gibench doctor`")
+        found = ours.recv()
+    except EOFError:
+        raise RunError("the renderer ends its process: `gibench doctor` shows why") from None
+    finally:
+        process.kill()
+        process.join()
+        ours.close()
+    if isinstance(found, GibenchError):
+        raise found
+    return dict(found)
+
+
+def _look(connection: Connection, variant: str, threads: int) -> None:
+    """Body of the process: send the facts, or what is wrong."""
+    leave_signals_to_parent()
+    threading.Thread(target=end_with_parent, daemon=True).start()
+    try:
+        connection.send(_facts(variant, threads))
+    except GibenchError as problem:
+        connection.send(problem)
 
 
 def _facts(variant: str, threads: int) -> dict[str, Any]:

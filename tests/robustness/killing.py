@@ -81,8 +81,8 @@ crop = 32
 @dataclass(frozen=True)
 class Command:
     """words: without the folder, which comes last. whole: files that are never changed once they are there, with what
-    they must be in the end; None for content that differs from run to run. before: what four rows of kills in five
-    find there already, so that more of them fall into what comes after it."""
+    they must be in the end; None for content that differs from run to run. before: what all
+    rows of kills but the first find there already, so that more of them fall into what comes after it."""
 
     words: tuple[str, ...]
     whole: Callable[[Path], dict[str, str | None]]
@@ -112,7 +112,7 @@ COMMANDS = {
     "make-dataset": Command(
         (*GIBENCH, "dataset", "make", "--rooms", "3", "--workers", "2", *TINY, "--out"), _frames
     ),
-    "bench": Command((*GIBENCH, *BENCH, "lightmap,path-traced", "--out"), _results, ("scenes", "run.json")),
+    "bench": Command((*GIBENCH, *BENCH, "lightmap", "--out"), _results, ("scenes", "run.json")),
     "training": Command((*GIBENCH, *BENCH, "elp", "--out"), _results, ("scenes", "run.json")),
 }
 
@@ -187,7 +187,7 @@ def killed(
         in_a_row = rows = 0
         shortened = 0.0
         while outcome.kills < kills and time.monotonic() < end:
-            given = bool(command.before) and rows % 5 > 0
+            given = bool(command.before) and rows > 0
             if given and not root.exists():
                 _give(command, undisturbed, root)
                 if not shortened:
@@ -217,7 +217,7 @@ def killed(
                 told(
                     f"{what}, {len(before)} files whole before and {len(after)} after, {lost or 'nothing'} lost"
                 )
-            if not who or in_a_row == 7 or outcome.kills == kills:
+            if not who or in_a_row == 8 or outcome.kills == kills:
                 in_a_row = 0
                 lost_before = len(outcome.lost)
                 completed(command, root)
