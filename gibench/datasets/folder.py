@@ -5,15 +5,15 @@ from __future__ import annotations
 import errno
 import os
 import re
-import shutil
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from filelock import FileLock, Timeout
 
 from gibench import gate
 from gibench.datasets.errors import FolderError
+from gibench.datasets.unfinished import keep_frames
 
 MANIFEST = "dataset.json"
 TABLE = "frames.parquet"
@@ -45,12 +45,13 @@ def whole_rooms(root: Path) -> list[int]:
 def remove_partials(root: Path, room: int | None = None) -> None:
     """Remove what killed processes left of a room, or of all rooms. Only for the holder of the lock.
 
-    Nothing goes but what carries such a process's own names, and nothing behind a link.
+    Nothing goes but what carries such a process's own names, and nothing behind a link; frames that took a while
+    wait for the next run.
     """
     stem = "[0-9]{6,}" if room is None else f"{room:06d}"
     for left in own_leftovers(root / "rooms", rf"\.{stem}\.partial-[0-9]+"):
         if gate.real_folder(left):
-            shutil.rmtree(left, ignore_errors=True)
+            keep_frames(root, int(left.name[1:].partition(".")[0]), left)
     if room is None:
         for left in own_leftovers(root / ENVIRONMENTS, r"\.[0-9a-f]{64}\.exr\.partial-[0-9]+"):
             left.unlink(missing_ok=True)
@@ -170,7 +171,5 @@ def unlock_folder(root: Path, lock: FileLock) -> None:
 
 def _remove_empty(folders: Iterable[Path]) -> None:
     for folder in folders:
-        try:
+        with suppress(OSError):
             folder.rmdir()
-        except OSError:
-            return

@@ -20,6 +20,7 @@ from gibench.datasets.errors import Interrupted, MakingError
 from gibench.datasets.previews import contact_sheet, write_picture
 from gibench.datasets.recipes import Recipe
 from gibench.datasets.room_making import Renderer, RoomMaker, given_cameras, machine
+from gibench.datasets.unfinished import unfinished_rooms
 
 
 @dataclass
@@ -99,9 +100,10 @@ def make(
             run.finish(started)
         except KeyboardInterrupt:
             run.tidy(started)
-            whole = len(folder.whole_rooms(root))
+            whole, waiting = len(folder.whole_rooms(root)), sum(unfinished_rooms(root).values())
+            kept = f" and {waiting} frames of others" if waiting else ""
             how = f"to continue run `{command}`" if command else "the same call continues"
-            raise Interrupted(f"stopped with {whole} of {recipe.rooms} rooms whole; {how}") from None
+            raise Interrupted(f"stopped with {whole} of {recipe.rooms} rooms whole{kept}; {how}") from None
         except MakingError:
             run.tidy(started)
             raise
@@ -232,7 +234,7 @@ class _Run:
     def tidy(self, started: float) -> None:
         """Leave a valid dataset behind a run that was stopped; the next run writes what cannot be written."""
         folder.remove_partials(self.root)
-        if not folder.whole_rooms(self.root):
+        if not folder.whole_rooms(self.root) and not unfinished_rooms(self.root):
             folder.remove_empty_dataset(self.root)
         elif self.manifest is not None:
             with contextlib.suppress(OSError):

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 import gibench
-from gibench.datasets import exr
+from gibench.datasets import exr, unfinished
 from gibench.datasets.errors import RecipeError, StorageError
 from gibench.datasets.files import as_json, sync_tree
 from gibench.datasets.folder import RECORD, partial_folder, room_folder
@@ -260,15 +260,18 @@ class RoomMaker:
         try:
             record = self._filled(partial, room, report)
             (partial / RECORD).write_bytes(as_json(record))
+            (partial / unfinished.JOURNAL).unlink(missing_ok=True)
             sync_tree(partial)
             _renamed(partial, final)
+            unfinished.forget_frames(self.root, room)
         except (RejectedRoom, NoPlaceForCamera) as reason:
             shutil.rmtree(partial)
+            unfinished.forget_frames(self.root, room)
             if len(self.recipe.scenes) == 1:
                 raise
             return {"rejected": str(reason)}
         except BaseException:
-            shutil.rmtree(partial, ignore_errors=True)
+            unfinished.keep_frames(self.root, room, partial)
             raise
         return record
 
@@ -291,17 +294,23 @@ class RoomMaker:
             if lighting.environment is not None:
                 keep_panorama(self.root, lighting.environment.panorama)
         given = given_cameras(recipe, number)
+        waiting = unfinished.WaitingFrames(self.root, number)
+        kept: list[dict[str, Any]] = []
         frames: list[Future[dict[str, Any]]] = []
         # Compressing and writing a frame goes on while the next one renders. One frame at most waits for it,
         # so memory does not grow with the number of views.
         with ThreadPoolExecutor(max_workers=1) as writer:
             for view in recipe.rendered_views(given, number):
+                if (waited := waiting.take(self._known(room, view), folder)) is not None:
+                    kept.append(waited)
+                    report("frame", {"paths": 0, "seconds": 0.0})
+                    continue
                 rendered = loaded.rendered(view)
                 report("frame", {"paths": rendered.paths, "seconds": rendered.kernel_seconds})
                 if frames:
                     frames[-1].result()
                 frames.append(writer.submit(self._stored, folder, room, view, rendered))
-        records = [frame.result() for frame in frames]
+        records = sorted([*kept, *(frame.result() for frame in frames)], key=lambda record: record["view"])
         clock.lap("render")
         return {
             "room": number,
@@ -316,6 +325,22 @@ class RoomMaker:
             "files": files,
         }
 
+    def _known(self, room: Room | ImportedRoom, view: int) -> dict[str, Any]:
+        """What the record of a frame says that is known before it is rendered."""
+        camera = room.cameras[view]
+        return {
+            "view": view,
+            "file": f"frames/{view:04d}.exr",
+            "camera": list(camera.position),
+            "target": list(camera.target),
+            "fov": camera.fov,
+            **camera.peculiarities,
+            "path": camera.path,
+            "step": camera.step,
+            **({"lighting": lighting_record(room.lightings[view])} if room.lightings else {}),
+            "seed": frame_seed(self.recipe, room.index, view),
+        }
+
     def _stored(
         self, folder: Path, room: Room | ImportedRoom, view: int, rendered: RenderedFrame
     ) -> dict[str, Any]:
@@ -325,21 +350,12 @@ class RoomMaker:
             content = exr.encode(rendered.arrays)
         except StorageError as problem:
             raise StorageError(f"view {view}: {problem}") from None
-        file = f"frames/{view:04d}.exr"
-        (folder / file).write_bytes(content)
-        camera = room.cameras[view]
+        known = self._known(room, view)
+        (folder / known["file"]).write_bytes(content)
         color = rendered.arrays.get("color")
-        return {
-            "view": view,
-            "file": file,
+        record = {
+            **known,
             **_fingerprint(content),
-            "camera": list(camera.position),
-            "target": list(camera.target),
-            "fov": camera.fov,
-            **camera.peculiarities,
-            "path": camera.path,
-            "step": camera.step,
-            **({"lighting": lighting_record(room.lightings[view])} if room.lightings else {}),
             "exposure": None if color is None else float(reference_exposure(color)),
             "largest": None if color is None else float(color.max()),
             "spp": rendered.spp,
@@ -350,8 +366,9 @@ class RoomMaker:
             "denoise_seconds": rendered.denoise_seconds,
             "denoise_change": rendered.denoise_change,
             "seconds": rendered.seconds,
-            "seed": frame_seed(self.recipe, room.index, view),
         }
+        unfinished.write_down(folder, record)
+        return record
 
 
 def _renamed(partial: Path, final: Path) -> None:

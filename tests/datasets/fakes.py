@@ -84,11 +84,15 @@ def write_room(room: SimpleNamespace, folder: Path, **_: Any) -> None:
 
 @dataclass
 class Setup:
-    """Puts the fakes in place. slow: seconds a frame. rejects: rooms that cannot be built. facts: what to answer."""
+    """Puts the fakes in place. slow: seconds a frame. rejects: rooms that cannot be built. facts: what to answer.
+
+    seconds: what a frame says that it took.
+    """
 
     slow: float = 0.0
     rejects: tuple[int, ...] = ()
     facts: dict[str, Any] = field(default_factory=lambda: FACTS)
+    seconds: float = 0.001
 
     def __call__(self) -> dict[str, Any]:
         def sampled(seed: int, index: int, **settings: Any) -> SimpleNamespace:
@@ -98,7 +102,9 @@ class Setup:
 
         def rendered(scene: Any, camera: Any, **settings: Any) -> SimpleNamespace:
             time.sleep(self.slow)
-            return render_frame(scene, camera, **settings)
+            frame = render_frame(scene, camera, **settings)
+            frame.seconds = self.seconds
+            return frame
 
         scene = SimpleNamespace(materials=("oak",), shapes=("floor.0",), guide=None)
         modules = {
