@@ -10,7 +10,7 @@ import drjit as dr
 import mitsuba as mi
 
 from gibench.rendering.camera import PinholeCamera, RayGenerator
-from gibench.rendering.lobes import NOT_DIFFUSE
+from gibench.rendering import flags
 from gibench.rendering.scene import Scene
 
 
@@ -35,7 +35,7 @@ class FirstHits:
     @property
     def glossy(self) -> Any:
         """mi.Bool, whether something was hit that reflects other than diffusely."""
-        return self.active & ((self.bsdf.flags() & NOT_DIFFUSE) != 0)
+        return self.active & ((self.bsdf.flags() & flags.NOT_DIFFUSE) != 0)
 
     @property
     def normal(self) -> Any:

@@ -17,9 +17,6 @@ from numpy.typing import NDArray
 from gibench.rendering.backend import is_scalar, registry_key
 from gibench.rendering.mesh_curvature import corner_tensors
 
-FLAGS = mi.RayFlags.All | mi.RayFlags.dNSdUV
-"""What a surface interaction must have been computed with."""
-
 UMBILIC_TOLERANCE = 1e-4
 """Relative difference of the principal curvatures below which they count as equal."""
 
@@ -55,7 +52,7 @@ class Curvature:
     def principal(self, si: Any, preliminary: Any, active: Any = True) -> tuple[Any, Any, Any]:
         """The principal curvatures (1/m), the larger in size first, and the unit direction of the first.
 
-        si: mi.SurfaceInteraction3f, computed with FLAGS (a mesh does without); preliminary: the
+        si: mi.SurfaceInteraction3f, computed with `flags.HIT_WITH_CURVATURE` (a mesh does without); preliminary: the
         mi.PreliminaryIntersection3f it is from. Positive where the surface bends towards the side that si.wi is on. The
         direction is in the plane of the shading normal. 0 on a miss and where the surface is no surface.
         """

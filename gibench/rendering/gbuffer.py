@@ -15,11 +15,10 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from gibench.rendering import surface
+from gibench.rendering import flags, surface
 from gibench.rendering.backend import is_scalar
 from gibench.rendering.camera import PinholeCamera, RayGenerator
 from gibench.rendering.channels import CHANNELS, SETS
-from gibench.rendering.curvature import FLAGS
 from gibench.rendering.integrator import bsdf_at, shading_normal
 from gibench.rendering.replay import camera_arrays, ray_generator, replayed
 from gibench.rendering.scene import Scene
@@ -48,12 +47,12 @@ class Hit:
     rays: mi.Ray3f. si: mi.SurfaceInteraction3f. valid: whether there is something. bsdf: mi.BSDFPtr.
     """
 
-    def __init__(self, scene: Scene, rays: Any, flags: Any) -> None:
-        """flags: mi.RayFlags, what is computed of the surface."""
+    def __init__(self, scene: Scene, rays: Any, ray_flags: Any) -> None:
+        """ray_flags: mi.RayFlags, what is computed of the surface."""
         self.scene = scene
         self.rays = rays
         self.preliminary = scene.mi_scene.ray_intersect_preliminary(rays, coherent=True)
-        self.si = self.preliminary.compute_surface_interaction(rays, flags)
+        self.si = self.preliminary.compute_surface_interaction(rays, ray_flags)
         self.valid = self.si.is_valid()
         self.bsdf = bsdf_at(self.si, rays)
 
@@ -112,8 +111,8 @@ def _values(
     scene: Scene, wanted: Collection[str], generator: RayGenerator, previous: RayGenerator | None, pixel: Any
 ) -> dict[str, Any]:
     """Channels at film positions, as `surface_arrays` returns them."""
-    flags = FLAGS if not set(SETS["curvature"]).isdisjoint(wanted) else mi.RayFlags.All
-    hit = Hit(scene, generator.rays(pixel), flags)
+    bent = not set(SETS["curvature"]).isdisjoint(wanted)
+    hit = Hit(scene, generator.rays(pixel), flags.HIT_WITH_CURVATURE if bent else mi.RayFlags.All)
     names: dict[str, Callable[[], Any]] = {
         "position": lambda: hit.masked(hit.si.p),
         "normal": lambda: hit.normal,
@@ -137,7 +136,7 @@ def _values(
             "reflected_material_id": lambda: scene.material_ids(mirror.bsdf, mirror.valid),
             "reflected_shape_id": lambda: scene.shape_ids(mirror.si.shape, mirror.valid),
         }
-    if not set(SETS["curvature"]).isdisjoint(wanted):
+    if bent:
         first, second, direction = scene.curvature.principal(hit.si, hit.preliminary)
         names |= {
             "curvature": lambda: mi.Vector2f(first, second),

@@ -18,9 +18,10 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
+from gibench.rendering import flags
 from gibench.rendering.backend import is_scalar
 from gibench.rendering.light_sampling import emission, emission_weight, inverse, mis_weight, sample_light
-from gibench.rendering.lobes import DIFFUSE, NOT_DIFFUSE, diffuse_lobe, split
+from gibench.rendering.lobes import diffuse_lobe, split
 
 RR_DEPTH = 2
 """Scattering events after which Russian roulette may end a path. Variance times time over three furnished rooms is 7 to
@@ -217,10 +218,10 @@ def scatter_paths(
     of the result is 0.
     """
     by_hand = layers is not None and (layers.principled or layers.masked)
-    mask = {"all": int(mi.BSDFFlags.All), "diffuse": DIFFUSE, "specular": NOT_DIFFUSE}[lobes]
+    mask = {"all": flags.ALL_LOBES, "diffuse": flags.DIFFUSE, "specular": flags.NOT_DIFFUSE}[lobes]
     # What ignores the lobes that are asked for is sampled whole and taken apart. So is a material with holes, whose
     # samples Mitsuba weighs wrongly (a coat four times) where the diffuse lobe alone is asked for.
-    asked = mi.BSDFContext(mi.TransportMode.Radiance, int(mi.BSDFFlags.All) if by_hand else mask)
+    asked = mi.BSDFContext(mi.TransportMode.Radiance, flags.ALL_LOBES if by_hand else mask)
     active = active & si.is_valid() & ((bsdf.flags() & mask) != 0) & (max_depth >= 1)
 
     # The same calls as in the loop, and one more for the diffuse lobe alone: kernels stay small.

@@ -14,6 +14,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from gibench.rendering import flags
 from gibench.rendering.backend import is_scalar, registry_key
 from gibench.rendering.children import children_of
 
@@ -25,8 +26,6 @@ PRINCIPLED = ("Principled", "PrincipledThin")
 
 PLAIN_ETA = ("SmoothPlastic", "SmoothDielectric")
 """Classes of materials whose index of refraction is a plain number, for which Mitsuba 3.9's attribute says 0."""
-
-TRANSMITS = mi.BSDFFlags.DeltaTransmission | mi.BSDFFlags.GlossyTransmission | mi.BSDFFlags.Null
 
 
 @dataclass
@@ -73,7 +72,7 @@ class Layers:
         name = bsdf.class_name()
         if not children:
             self.principled |= name in PRINCIPLED
-            self.transmits |= bool(int(bsdf.flags()) & int(TRANSMITS))
+            self.transmits |= bool(int(bsdf.flags()) & flags.TRANSMITS)
             if name in PLAIN_ETA:
                 self._etas[registry_key("BSDFPtr", bsdf)] = float(mi.traverse(bsdf)["eta"])
             return 0

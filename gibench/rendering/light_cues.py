@@ -16,7 +16,8 @@ import drjit as dr
 import mitsuba as mi
 
 from gibench.rendering.channels import CUES
-from gibench.rendering.integrator import NOT_DIFFUSE, bsdf_at, shading_normal
+from gibench.rendering import flags
+from gibench.rendering.integrator import bsdf_at, shading_normal
 from gibench.rendering.light_sampling import emission, emission_weight, inverse, mis_weight, sample_light
 from gibench.rendering.replay import ray_generator
 from gibench.rendering.sampling import IndependentSampler
@@ -73,7 +74,7 @@ def light_cues(scene: Scene, sampler: Any, rays: Any) -> dict[str, Any]:
     si = mi_scene.ray_intersect(rays, mi.RayFlags.All, True)
     active = si.is_valid()
     bsdf = bsdf_at(si, rays)
-    own = active & ((bsdf.flags() & NOT_DIFFUSE) == 0)
+    own = active & ((bsdf.flags() & flags.NOT_DIFFUSE) == 0)
     side = dr.mulsign(mi.Float(1), si.wi.z)
     front = mi.Vector3f(si.wi.x, si.wi.y, dr.abs(si.wi.z))
     bases, context = _Bases(front), mi.BSDFContext()

@@ -14,11 +14,8 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
+from gibench.rendering import flags
 from gibench.rendering.layers import Layers
-
-DIFFUSE = int(mi.BSDFFlags.DiffuseReflection)
-NOT_DIFFUSE = int(mi.BSDFFlags.All) & ~DIFFUSE
-"""Masks of the diffuse reflection, and of all lobes that count as specular."""
 
 SMALLEST = 1.2e-38
 """The smallest normal float32."""
@@ -35,10 +32,10 @@ def diffuse_lobe(layers: Layers | None, bsdf: Any, si: Any, wo: Any, active: Any
     layers: `Scene.layers`, without which all of `principled` counts as diffuse. bsdf: mi.BSDFPtr. wo: mi.Vector3f, in
     the frame of si.
     """
-    value = bsdf.eval(lobes_of(DIFFUSE), si, wo, active)
+    value = bsdf.eval(lobes_of(flags.DIFFUSE), si, wo, active)
     if layers is None or not layers.principled:
         return value
-    context = lobes_of(DIFFUSE)
+    context = lobes_of(flags.DIFFUSE)
     front = mi.SurfaceInteraction3f(si)
     front.wi = mi.Vector3f(si.wi.x, si.wi.y, dr.abs(si.wi.z))
     wo = mi.Vector3f(wo.x, wo.y, dr.mulsign(wo.z, si.wi.z))
@@ -56,7 +53,7 @@ def split(bsdf: Any, value: Any, diffuse: Any) -> tuple[Any, Any]:
 
     A difference leaves dust of rounding, so what does not exist is set to 0.
     """
-    other = dr.select((bsdf.flags() & NOT_DIFFUSE) != 0, dr.maximum(value - diffuse, 0), 0)
+    other = dr.select((bsdf.flags() & flags.NOT_DIFFUSE) != 0, dr.maximum(value - diffuse, 0), 0)
     return diffuse, other
 
 
@@ -68,8 +65,8 @@ def sample_specular(
     sample1, sample2: mi.Float and mi.Point2f in [0, 1). The first chooses among lobes and blended materials.
     """
     if not layers.principled:
-        return bsdf.sample(lobes_of(NOT_DIFFUSE), si, sample1, sample2, active)
-    bounce, weight = bsdf.sample(lobes_of(int(mi.BSDFFlags.All)), si, sample1, sample2, active)
+        return bsdf.sample(lobes_of(flags.NOT_DIFFUSE), si, sample1, sample2, active)
+    bounce, weight = bsdf.sample(lobes_of(flags.ALL_LOBES), si, sample1, sample2, active)
     return bounce, _specular_weight(layers, bsdf, si, bounce, weight, active)
 
 
@@ -81,9 +78,9 @@ def eval_pdf_sample_specular(
     Returns value, density, sample, value over density of the sample. The density is that by which the sample is drawn.
     """
     if not layers.principled:
-        return bsdf.eval_pdf_sample(lobes_of(NOT_DIFFUSE), si, wo, sample1, sample2, active)
+        return bsdf.eval_pdf_sample(lobes_of(flags.NOT_DIFFUSE), si, wo, sample1, sample2, active)
     value, pdf, bounce, weight = bsdf.eval_pdf_sample(
-        lobes_of(int(mi.BSDFFlags.All)), si, wo, sample1, sample2, active
+        lobes_of(flags.ALL_LOBES), si, wo, sample1, sample2, active
     )
     value = split(bsdf, value, diffuse_lobe(layers, bsdf, si, wo, active))[1]
     return value, pdf, bounce, _specular_weight(layers, bsdf, si, bounce, weight, active)

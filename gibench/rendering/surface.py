@@ -14,13 +14,11 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from gibench.rendering.layers import TRANSMITS
+from gibench.rendering import flags
 from gibench.rendering.scene import Scene
 
 LUMINANCE = (0.2126, 0.7152, 0.0722)
 """Of linear Rec. 709."""
-
-SHARP = mi.BSDFFlags.DeltaReflection | mi.BSDFFlags.DeltaTransmission | mi.BSDFFlags.Null
 
 
 def _attribute(evaluate, bsdf, name, si, active, default):
@@ -113,7 +111,7 @@ def _leaf_specular(scene, bsdf, si, active):
     base = (dr.square(eta - 1) + dr.square(k)) / (dr.square(eta + 1) + dr.square(k))
     plain = dr.select(active, tint * base, 0)
     if scene.layers.transmits:
-        through = active & ((bsdf.flags() & int(TRANSMITS)) != 0)
+        through = active & ((bsdf.flags() & flags.TRANSMITS) != 0)
         # A pane reflects at both of its faces, and what is between them back and forth.
         pane = through & ((bsdf.flags() & int(mi.BSDFFlags.Null)) != 0)
         base = dr.select(pane, 2 * base / (1 + base), base)
@@ -140,7 +138,7 @@ def _leaf_specular(scene, bsdf, si, active):
 
 
 def _leaf_roughness(scene, bsdf, si, active):
-    plain = dr.select((bsdf.flags() & int(SHARP)) != 0, mi.Float(0), mi.Float(1))
+    plain = dr.select((bsdf.flags() & flags.SHARP) != 0, mi.Float(0), mi.Float(1))
     alpha = _scalar(bsdf, "alpha", si, active, plain)
     along_u = _scalar(bsdf, "alpha_u", si, active, alpha)
     along_v = _scalar(bsdf, "alpha_v", si, active, along_u)

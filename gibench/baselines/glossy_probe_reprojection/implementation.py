@@ -34,7 +34,7 @@ from gibench.baselines.probes.reflections import mirrored_by, surfaces_of
 from gibench.baselines.replay import Replay, camera_arrays, ray_generator
 from gibench.baselines.stages import Stages
 from gibench.rendering import surface
-from gibench.rendering.curvature import FLAGS
+from gibench.rendering import flags
 
 LEAST_ENERGY = 0.01
 """Energy below which samples are all as good: equation 4 divides by it."""
@@ -61,7 +61,7 @@ def _gbuffer(scene, lightmap, camera, width: int, height: int):
 def _bent(scene, camera, preliminary, width: int, height: int):
     """Principal curvatures of what was hit, and the direction of the first."""
     ray = hits_of_rays(scene, ray_generator(camera), (width, height), preliminary).ray
-    si = preliminary.compute_surface_interaction(ray, FLAGS)
+    si = preliminary.compute_surface_interaction(ray, flags.HIT_WITH_CURVATURE)
     first, second, direction = scene.curvature.principal(si, preliminary, si.is_valid())
     bent = {"curvature": mi.Vector2f(first, second), "direction": mi.Vector3f(direction)}
     dr.eval(bent)

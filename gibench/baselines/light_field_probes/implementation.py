@@ -16,7 +16,8 @@ from gibench.baselines.method import Site, View
 from gibench.baselines.probes.baking import ProbeSettings
 from gibench.baselines.probes.maps import load_probes
 from gibench.baselines.replay import Replay, ray_generator
-from gibench.rendering.lobes import NOT_DIFFUSE, sample_specular
+from gibench.rendering import flags
+from gibench.rendering.lobes import sample_specular
 
 MAPS = ("light", "distance", "normal")
 
@@ -52,7 +53,7 @@ def glossy_light(scene, layers, field: LightField, sampler, si, bsdf, active, sa
     Exactly 0 where there is no such lobe. Returns besides, of each hit: rays that no probe could follow, texels that
     were looked at, and rays.
     """
-    glossy = active & ((bsdf.flags() & NOT_DIFFUSE) != 0)
+    glossy = active & ((bsdf.flags() & flags.NOT_DIFFUSE) != 0)
     total = mi.Color3f(0)
     lost, looked, traced = mi.UInt32(0), mi.UInt32(0), mi.UInt32(0)
     done = mi.UInt32(0)

@@ -7,8 +7,9 @@ import drjit as dr
 import mitsuba as mi
 
 from gibench.baselines.lightmap.lookup import Lightmap
+from gibench.rendering import flags
 from gibench.rendering.integrator import mis_weight
-from gibench.rendering.lobes import NOT_DIFFUSE, eval_pdf_sample_specular
+from gibench.rendering.lobes import eval_pdf_sample_specular
 
 
 def _scatter(scene, layers, sampler, si, bsdf, active):
@@ -37,7 +38,7 @@ def glossy_radiance(scene, layers, lightmap: Lightmap, sampler, si, bsdf, active
     diffuse light from the lightmap; then, up to `bounces` glossy reflections, its glossy lobe. Exactly 0 where there is
     no such lobe.
     """
-    glossy = active & ((bsdf.flags() & NOT_DIFFUSE) != 0)
+    glossy = active & ((bsdf.flags() & flags.NOT_DIFFUSE) != 0)
     total = mi.Spectrum(0)
     done = mi.UInt32(0)
 
@@ -58,7 +59,7 @@ def glossy_radiance(scene, layers, lightmap: Lightmap, sampler, si, bsdf, active
             gained = throughput * (emitted + lightmap.diffuse(hit, preliminary, alive))
 
             there = hit.bsdf(ray)
-            alive &= hit.is_valid() & (bounce < bounces) & ((there.flags() & NOT_DIFFUSE) != 0)
+            alive &= hit.is_valid() & (bounce < bounces) & ((there.flags() & flags.NOT_DIFFUSE) != 0)
             seen, ray, weight, pdf, delta = _scatter(scene, layers, sampler, hit, there, alive)
             gained += throughput * seen
             total += dr.select(dr.all(dr.isfinite(gained)), gained, 0)

@@ -193,10 +193,11 @@ def test_directional_albedo_against_many_samples(material, cosine):
     si = dr.zeros(mi.SurfaceInteraction3f, count)
     si.wi = mi.Vector3f(float(np.sqrt(1 - cosine**2)), 0.0, cosine)
     from gibench.rendering.layers import Layers
-    from gibench.rendering.lobes import NOT_DIFFUSE, lobes_of
+    from gibench.rendering import flags
+    from gibench.rendering.lobes import lobes_of
 
     found = np.array(directional_albedo(Layers([bsdf]), si, bsdf, dr.full(mi.Bool, True, count)))[:, 0]
     rng = np.random.default_rng(0)
     u = mi.Point2f(rng.random((2, count), dtype=np.float32))
-    _, weight = bsdf.sample(lobes_of(NOT_DIFFUSE), si, mi.Float(rng.random(count, dtype=np.float32)), u)
+    _, weight = bsdf.sample(lobes_of(flags.NOT_DIFFUSE), si, mi.Float(rng.random(count, dtype=np.float32)), u)
     np.testing.assert_allclose(found, np.array(weight).mean(axis=1), rtol=0.025)

@@ -34,7 +34,8 @@ def test_white_furnace():
 
 def test_coat_in_a_furnace():
     """What a rough plastic reflects diffusely of even light, at any view: its lobe integrated numerically."""
-    from gibench.rendering.lobes import DIFFUSE, lobes_of
+    from gibench.rendering import flags
+    from gibench.rendering.lobes import lobes_of
 
     sky = {"type": "constant", "radiance": scenes.rgb(1.0)}
     scene = load_dict(
@@ -49,7 +50,7 @@ def test_coat_in_a_furnace():
     lights = directions(200_000, 1)
     lights[:, 2] = np.abs(lights[:, 2])
     bsdf = mi.load_dict(scenes.MATERIALS["coat"])
-    lobe = np.array(bsdf.eval(lobes_of(DIFFUSE), si, mi.Vector3f(lights.T.astype(np.float32)))).T
+    lobe = np.array(bsdf.eval(lobes_of(flags.DIFFUSE), si, mi.Vector3f(lights.T.astype(np.float32)))).T
     np.testing.assert_allclose(radiance.mean(axis=0), 2 * np.pi * lobe.mean(axis=0), rtol=0.01)
 
 
@@ -207,7 +208,8 @@ def test_black_in_one_component():
 @pytest.mark.parametrize("material", ["diffuse", "coat", "textured_coat"])
 def test_diffuse_lobes_are_products(material):
     """A lobe's value at any view is that along the normal times a factor that no light direction changes."""
-    from gibench.rendering.lobes import DIFFUSE, lobes_of
+    from gibench.rendering import flags
+    from gibench.rendering.lobes import lobes_of
 
     bsdf = mi.load_dict(scenes.MATERIALS[material])
     si = mi.SurfaceInteraction3f()
@@ -222,7 +224,7 @@ def test_diffuse_lobes_are_products(material):
         place = mi.SurfaceInteraction3f(si)
         place.wi = mi.Vector3f(np.ascontiguousarray(view.T.astype(np.float32)))
         light = mi.Vector3f(np.ascontiguousarray(light.T.astype(np.float32)))
-        return np.array(bsdf.eval(lobes_of(DIFFUSE), place, light)).T
+        return np.array(bsdf.eval(lobes_of(flags.DIFFUSE), place, light)).T
 
     up = np.tile([0.0, 0.0, 1.0], (count, 1))
     np.testing.assert_allclose(
