@@ -73,3 +73,14 @@ def test_what_networks_share_needs_no_renderer():
     code = f"import sys, {', '.join(names)}; print(sorted({{'mitsuba', 'drjit'}} & set(sys.modules)))"
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
     assert result.stdout.strip() == "[]", result.stdout + result.stderr
+
+
+def test_importing_a_module_needs_no_variant():
+    modules = [
+        ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts).removesuffix(".__init__")
+        for path in sorted(PACKAGE.rglob("*.py"))
+        if path.stem != "__main__"
+    ]
+    code = f"import importlib, mitsuba\nfor m in {modules}: importlib.import_module(m)\nprint(mitsuba.variant())"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300)
+    assert result.stdout.strip() == "None", result.stdout + result.stderr

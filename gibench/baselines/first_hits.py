@@ -9,8 +9,8 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from gibench.rendering.camera import PinholeCamera, RayGenerator
 from gibench.rendering import flags
+from gibench.rendering.camera import PinholeCamera, RayGenerator
 from gibench.rendering.scene import Scene
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+import mitsuba as mi
 import numpy as np
 import shapely
 from numpy.typing import NDArray
@@ -138,8 +139,6 @@ def _bare_scene(room: Room) -> Scene:
 
 
 def _mitsuba_mesh(name: str, mesh: Mesh) -> Any:
-    import mitsuba as mi
-
     shape = mi.Mesh(name, len(mesh.vertices), len(mesh.faces))
     parameters = mi.traverse(shape)
     parameters["vertex_positions"] = mesh.vertices.astype(np.float32).ravel()
@@ -150,8 +149,6 @@ def _mitsuba_mesh(name: str, mesh: Mesh) -> Any:
 
 def empty(scene: Scene, lights: Sequence[AreaLight], spacing: float) -> NDArray[np.bool_]:
     """(N,) whether nothing that rays at that spacing (m) meet is within the clearance of each light."""
-    import mitsuba as mi
-
     if not lights:
         return np.zeros(0, dtype=bool)
     origins: list[NDArray[np.float32]] = []

@@ -15,8 +15,8 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from gibench.rendering.channels import CUES
 from gibench.rendering import flags
+from gibench.rendering.channels import CUES
 from gibench.rendering.integrator import bsdf_at, shading_normal
 from gibench.rendering.light_sampling import emission, emission_weight, inverse, mis_weight, sample_light
 from gibench.rendering.replay import ray_generator

@@ -9,10 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
 from gibench.rendering.backend import is_scalar
+from gibench.rendering.children import children_of
 from gibench.rendering.latlong import for_envmap
 from gibench.rendering.lighting import AreaLight, Lighting, LightingError
 from gibench.rendering.panoramas import HEIGHT
@@ -45,8 +48,6 @@ class Lights:
 
     def show(self, lighting: Lighting) -> None:
         """Take another lighting."""
-        import mitsuba as mi
-
         self.lighting = lighting
         self.centre = mi.Point3f(list(lighting.area.centre) if lighting.area else [0.0] * 3)
         self.placed = mi.Float(1.0 if lighting.area else 0.0)
@@ -75,10 +76,6 @@ class LightRig:
         panoramas: whether environments will be set. Without them the scene's own environment stays what it is, and a
         scene without one needs none. Raises LightingError for a scene with lights whose brightness nothing sets.
         """
-        import mitsuba as mi
-
-        from gibench.rendering.children import children_of  # which needs a variant to be imported
-
         mi_scene = scene.mi_scene
         parts = {
             f"part{number}": child
@@ -162,7 +159,6 @@ class LightRig:
 
     def _set_area(self, area: AreaLight | None) -> None:
         # Out of sight, but never far away: the scene's bounds decide how rays are started.
-        import mitsuba as mi
 
         hidden = AreaLight(tuple(self._corner), (0, 0, 1), HIDDEN, HIDDEN, (0, 0, 0))  # type: ignore[arg-type]
         shown = area or hidden
@@ -173,8 +169,6 @@ class LightRig:
 
     def _set_sky(self, lighting: Lighting) -> bool:
         """Returns whether the sky gives light."""
-        import mitsuba as mi
-
         environment, own = lighting.environment, self._own_sky
         assert own is not None
         bright = environment is not None or (lighting.kind == "own" and own.bright)
@@ -220,8 +214,6 @@ class _Sky:
     @classmethod
     def of(cls, emitter: Any) -> _Sky:
         """Raises LightingError for what no panorama can stand for."""
-        import mitsuba as mi
-
         if emitter is None:
             return cls()
         parameters = mi.traverse(emitter)
@@ -242,8 +234,6 @@ class _Sky:
 
 def _keep_out(*values: Any) -> None:
     """Makes numbers inputs of kernels, in place of parts of their code."""
-    import drjit as dr
-
     if not is_scalar():
         dr.make_opaque(*values)
 
@@ -254,8 +244,6 @@ def _around(image: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def _transform(matrix: NDArray[np.float64]) -> Any:
-    import mitsuba as mi
-
     return mi.AffineTransform4f(matrix)
 
 

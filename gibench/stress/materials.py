@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+import mitsuba as mi
 import numpy as np
 
+from gibench.baselines.first_hits import first_hits
+from gibench.baselines.image_space_gathering import reflectance
 from gibench.datasets import exr
 from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.render import render_frame
@@ -77,11 +80,6 @@ def metal_in_uniform_light(alpha: float) -> Found:
 
 def split_sum(scene: Any, alpha: float) -> Check:
     """What image space gathering multiplies its blurred mirror image with, against the quadrature."""
-    import mitsuba as mi
-
-    from gibench.baselines.first_hits import first_hits
-    from gibench.baselines.image_space_gathering import reflectance
-
     checks = []
     for degrees in (0.1, 45, 80):
         hits = first_hits(scene, spot(degrees), (1, 1))

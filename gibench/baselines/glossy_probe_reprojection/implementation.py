@@ -33,8 +33,7 @@ from gibench.baselines.probes.maps import load_probes
 from gibench.baselines.probes.reflections import mirrored_by, surfaces_of
 from gibench.baselines.replay import Replay, camera_arrays, ray_generator
 from gibench.baselines.stages import Stages
-from gibench.rendering import surface
-from gibench.rendering import flags
+from gibench.rendering import flags, surface
 
 LEAST_ENERGY = 0.01
 """Energy below which samples are all as good: equation 4 divides by it."""

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from gibench.baselines.lightmap.unwrapping import NONE, LightmapError
 from gibench.datasets.exr import DARK, fits_half
+from gibench.rendering.lobes import diffuse_lobe
 from gibench.rendering.scene import Scene
 
 ATLAS, CORNERS, OFFSETS = "atlas.exr", "corners.npy", "offsets.npy"
@@ -55,8 +56,6 @@ class Lightmap:
         si: mi.SurfaceInteraction3f; preliminary: the mi.PreliminaryIntersection3f it was computed from. What a hit
         emits is not in it. Shapes without triangles give 0.
         """
-        from gibench.rendering.lobes import diffuse_lobe  # asks Mitsuba for its flags, so a variant is needed
-
         active = active & si.is_valid()
         irradiance = self.irradiance(si, preliminary, active)
         towards = mi.Vector3f(0, 0, dr.copysign(mi.Float(1), si.wi.z))

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from gibench.baselines.lightmap.coverage import Coverage
 from gibench.baselines.lightmap.unwrapping import Unwrapping
 from gibench.rendering.estimate import LANES, MAXIMUM_LEVELS
+from gibench.rendering.integrator import scatter_paths
+from gibench.rendering.lobes import diffuse_lobe
 from gibench.rendering.sampling import StratifiedSampler
 from gibench.rendering.scene import Scene
 
@@ -119,8 +121,6 @@ def trace_texels(
 def _launch(points, begin, number, start, size, samples, max_depth, seed):
     """Sums over `samples` paths of each of `size` texels: light over lobe, and how many paths tell."""
     # Both ask Mitsuba for its flags, so a variant is needed.
-    from gibench.rendering.integrator import scatter_paths
-    from gibench.rendering.lobes import diffuse_lobe
 
     lanes = size * samples
     levels = (samples.bit_length() - 1) // 2

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import mitsuba as mi
 import numpy as np
 import xatlas
 from numpy.typing import NDArray
@@ -54,8 +55,6 @@ class Unwrapping:
 
 
 def _is_diffuse(shape: Any) -> bool:
-    import mitsuba as mi
-
     return bool(mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.DiffuseReflection))
 
 
@@ -74,8 +73,6 @@ def unwrap(scene: Scene, texels_per_metre: float) -> Unwrapping:
     Shapes without a diffuse lobe are left out. So is a lamp's sphere or disk, which has no triangles to carry
     coordinates: its light outshines by far what it reflects. LightmapError for any other diffuse shape that is no mesh.
     """
-    import mitsuba as mi
-
     numbers: list[int] = []
     meshes: list[tuple[NDArray[np.float32], NDArray[np.uint32]]] = []
     offsets = np.full(len(scene.shapes) + 1, NONE, dtype=np.uint32)

@@ -13,6 +13,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
@@ -103,8 +104,6 @@ def inverted(scene: Scene, found: FloatArray) -> dict[str, NDArray[np.bool_]]:
 
     Needs a vectorised variant.
     """
-    import mitsuba as mi
-
     points = found[np.random.default_rng(2).permutation(len(found))[:POINTS]]
     directions = np.tile(sphere(RAYS), (len(points), 1))
     _, shape, face, normal = hits(scene, np.repeat(points, RAYS, axis=0), directions)

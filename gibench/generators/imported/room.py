@@ -25,12 +25,19 @@ from gibench.generators.cameras import (
 from gibench.generators.imported.changes import Change
 from gibench.generators.imported.errors import NoPlaceForCamera, SceneFileError
 from gibench.generators.imported.glb import write_scene_glb
+from gibench.generators.imported.opened import opened_scene
+from gibench.generators.imported.openings import find_openings
+from gibench.generators.imported.orientation import oriented
 from gibench.generators.imported.placing import placed_matrix
 from gibench.generators.imported.scene import ImportedScene
+from gibench.generators.imported.survey import hits, survey
 from gibench.generators.imported.tree import Node
+from gibench.generators.imported.turning import without_flips
 from gibench.generators.parts import Camera, FloatArray
 from gibench.generators.scene_files import camera_records, lighting_records, sensor_element
 from gibench.generators.trajectories import Spread
+from gibench.rendering.backend import is_scalar, select_variant
+from gibench.rendering.free_space import NoFreeSpace
 from gibench.rendering.lighting import Lighting
 from gibench.rendering.scene import OPENINGS
 
@@ -81,13 +88,7 @@ def import_room(
 
     Raises SceneFileError where no view passes the checks, or where there is none at all.
     """
-    from gibench.rendering.backend import is_scalar, select_variant
-
     select_variant()  # before anything loads Mitsuba, so that it finds the right LLVM
-    from gibench.generators.imported.openings import find_openings
-    from gibench.generators.imported.orientation import oriented
-    from gibench.generators.imported.turning import without_flips
-    from gibench.rendering.free_space import NoFreeSpace
 
     found, why_none = np.zeros((0, 3)), "the variant scalar_rgb is too slow to look for one"
     if not is_scalar():
@@ -103,8 +104,6 @@ def import_room(
     if path is not None and path_views:
         sequences, path = (PathPlan(path, path, path_views),), None
     if views or sequences:
-        from gibench.generators.imported.survey import survey
-
         if not len(found):
             raise NoPlaceForCamera(
                 f"{scene.tree.file}: no place for a camera: {why_none}; give cameras with --cameras"
@@ -145,8 +144,6 @@ def opened_import(room: ImportedRoom, opened: str) -> ImportedRoom:
 
     Raises SceneFileError where no free space was found, or none of it is open to the sky afterwards.
     """
-    from gibench.generators.imported.opened import opened_scene
-
     if not len(room.free):
         raise SceneFileError(
             f"{room.scene.tree.file}: opened is '{opened}', but nothing in the scene is enclosed: leave it out"
@@ -157,9 +154,6 @@ def opened_import(room: ImportedRoom, opened: str) -> ImportedRoom:
 
 def _near_planes_told(scene: ImportedScene, resolution: tuple[int, int]) -> ImportedScene:
     """The scene with a warning for each camera whose near plane cuts away something that is seen here."""
-    from gibench.generators.imported.survey import hits
-    from gibench.rendering.backend import is_scalar
-
     changes = []
     for given in scene.cameras:
         if given.near <= 0 or is_scalar():

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 import shapely
 from numpy.typing import NDArray
@@ -65,9 +67,6 @@ class SceneCaster:
 
 def hits(scene: Scene, origins: FloatArray, directions: FloatArray) -> tuple[Any, Any, Any, Any]:
     """Distance (inf on a miss), shape id (0 on a miss), face and geometric normal of what rays (N, 3) meet."""
-    import drjit as dr
-    import mitsuba as mi
-
     ray = mi.Ray3f(
         mi.Point3f(np.ascontiguousarray(np.transpose(origins), dtype=np.float32)),
         mi.Vector3f(np.ascontiguousarray(np.transpose(directions), dtype=np.float32)),
@@ -154,9 +153,6 @@ def _free_floor(scene: Scene, found: FloatArray, floor: float) -> tuple[shapely.
 
 def _boxes(scene: Scene) -> FloatArray:
     """(shapes, 2, 3) bounding boxes by shape id − 1, metres."""
-    import drjit as dr
-    import mitsuba as mi
-
     boxes = np.zeros((len(scene.shapes), 2, 3))
     for shape in scene.mi_scene.shapes():
         number = int(scene.shape_ids(mi.ShapePtr(shape), dr.full(mi.Bool, True))[0]) - 1

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
@@ -92,8 +93,6 @@ def _baked(
 
 def _attributes(shape: Any) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
     """Attributes of the vertices, and of the faces, of a loaded mesh by name, (N, C)."""
-    import mitsuba as mi
-
     own = ("vertex_positions", "vertex_normals", "vertex_texcoords")
     found: dict[str, dict[str, FloatArray]] = {"vertex_": {}, "face_": {}}
     counts = {"vertex_": shape.vertex_count(), "face_": shape.face_count()}

@@ -20,6 +20,7 @@ from gibench.rendering.free_space import NoFreeSpace, beginnings, free_space, su
 from gibench.rendering.guiding.directions import BINS, bin_of
 from gibench.rendering.guiding.grid import FACES, Grid
 from gibench.rendering.guiding.guide import Distributions, Guide, lights_of
+from gibench.rendering.integrator import follow_paths
 from gibench.rendering.sampling import IndependentSampler
 
 SEED = 0
@@ -115,8 +116,6 @@ class Samples:
 
 
 def _trace(scene: Any, guide: Guide, starts: Any, count: Any, number: int) -> Samples:
-    from gibench.rendering.integrator import follow_paths
-
     with tracing():
         sampler = IndependentSampler()
         seed = np.random.SeedSequence(SEED, spawn_key=(number,)).generate_state(1)[0]

@@ -192,8 +192,8 @@ def test_directional_albedo_against_many_samples(material, cosine):
     count = 1 << 17
     si = dr.zeros(mi.SurfaceInteraction3f, count)
     si.wi = mi.Vector3f(float(np.sqrt(1 - cosine**2)), 0.0, cosine)
-    from gibench.rendering.layers import Layers
     from gibench.rendering import flags
+    from gibench.rendering.layers import Layers
     from gibench.rendering.lobes import lobes_of
 
     found = np.array(directional_albedo(Layers([bsdf]), si, bsdf, dr.full(mi.Bool, True, count)))[:, 0]
