@@ -81,6 +81,8 @@ def test_importing_a_module_needs_no_variant():
         for path in sorted(PACKAGE.rglob("*.py"))
         if path.stem != "__main__"
     ]
-    code = f"import importlib, mitsuba\nfor m in {modules}: importlib.import_module(m)\nprint(mitsuba.variant())"
+    code = (
+        f"import importlib, mitsuba\nfor m in {modules}: importlib.import_module(m)\nprint(mitsuba.variant())"
+    )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300)
     assert result.stdout.strip() == "None", result.stdout + result.stderr

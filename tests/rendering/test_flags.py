@@ -13,7 +13,7 @@ from gibench.rendering import flags
 
 def test_masks_are_mitsubas():
     lobes = mi.BSDFFlags
-    assert flags.DIFFUSE == lobes.DiffuseReflection
+    assert lobes.DiffuseReflection == flags.DIFFUSE
     assert flags.DIFFUSE | flags.NOT_DIFFUSE == flags.ALL_LOBES == lobes.All
     assert flags.DIFFUSE & flags.NOT_DIFFUSE == 0
     for plugin, reflects, transmits, sharp in (
