@@ -88,7 +88,7 @@ def test_commands_that_make_datasets_are_understood(home, words, monkeypatch):
     """The recipe that each resolves to; making them all would take hours."""
     asked = []
     monkeypatch.chdir(home)
-    for target in ("make_and_tell", "dry_run"):
+    for target in ("make_and_print", "dry_run"):
         monkeypatch.setattr(f"gibench.cli.making.{target}", lambda *given: asked.append(given))
     assert run(make_app, words[1:]) == 0
     recipe = next(value for value in asked[0] if hasattr(value, "rooms"))

@@ -278,7 +278,8 @@ class Implementation(Protocol):
     """The stages. One object serves one training, or one scene, one preparation and one seed.
 
     A constructor takes the settings (`Method.settings`). A method whose card says `trains` has `train` too, see
-    `Trainable`.
+    `Trainable`. One whose knobs that do not bake may be turned after `prepare` has `adjust`, which takes
+    settings as the constructor does, from the next frame on.
     """
 
     def __init__(self, settings: Mapping[str, Setting]) -> None:
@@ -299,10 +300,3 @@ class Trainable(Protocol):
 
         May return seconds that were spent before, in a run that was cut off.
         """
-
-
-class Adjustable(Protocol):
-    """An implementation whose knobs that do not bake may be turned after `prepare`."""
-
-    def adjust(self, settings: Mapping[str, Setting]) -> None:
-        """Take these settings from the next frame on; those that bake are as they were."""

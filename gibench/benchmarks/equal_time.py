@@ -1,4 +1,4 @@
-"""Equal time: the dearest setting of each method that meets a given time per frame on this machine.
+"""Equal time: the most expensive setting of each method that meets a given time per frame on this machine.
 
 What is tried along the way are ordinary results over the whole path of every scene, so nothing is measured twice and
 nothing is extrapolated.
@@ -17,7 +17,7 @@ from gibench.benchmarks.running import Run
 from gibench.benchmarks.settings import Choice, label
 
 
-def dearest_within(values: tuple[Setting, ...], limit: float, measure: Callable[[Setting], float]) -> int:
+def last_within(values: tuple[Setting, ...], limit: float, measure: Callable[[Setting], float]) -> int:
     """Index of the last of `values`, cheapest first, whose measure is at most `limit`; −1 where none is.
 
     Bisection: measures at most ⌈log₂(n + 1)⌉ of them, and both sides of the limit.
@@ -64,7 +64,7 @@ def _searched(run: Run, limit: float, found: Found, base: Choice) -> tuple[dict[
         tried[value] = (_mean_of_medians(run, jobs), jobs, choice)
         return tried[value][0]
 
-    index = dearest_within(values, limit, measure)
+    index = last_within(values, limit, measure)
     entry: dict[str, Any] = {
         "ms": limit,
         "method": method.id,

@@ -14,7 +14,7 @@ from typing import Any
 from gibench.benchmarks import worker
 
 #: Seconds that a process which takes too long is given to say where it is.
-LAST_WORDS = 1.0
+TRACEBACK_SECONDS = 1.0
 
 
 class Process:
@@ -38,12 +38,12 @@ class Process:
         self.process.join()
         self.connection.close()
 
-    def heard(self, limit: float) -> tuple[str, Any]:
+    def receive(self, limit: float) -> tuple[str, Any]:
         """The next message; ("lost", reason and traceback) where the process dies or takes over `limit` seconds."""
         if not self.connection.poll(limit):
             with suppress(OSError):
                 os.kill(self.process.pid or 0, signal.SIGUSR1)
-            time.sleep(LAST_WORDS)
+            time.sleep(TRACEBACK_SECONDS)
             reason = f"it took more than {limit:g} s, the track's limit"
             return "lost", {"reason": reason, "traceback": log_tail(self.task.log)}
         try:

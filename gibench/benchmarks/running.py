@@ -299,9 +299,9 @@ class Run:
         task = self._task([job], scene=None)
         with Process(task) as process:
             clock = time.perf_counter()
-            kind, content = process.heard(STARTUP_SECONDS)
+            kind, content = process.receive(STARTUP_SECONDS)
             if kind == "ready":
-                kind, content = process.heard(self.order.size.budget.prepare)
+                kind, content = process.receive(self.order.size.budget.prepare)
             self.spent["prepare"] += time.perf_counter() - clock
         if kind == "trained":
             task.log.unlink(missing_ok=True)
@@ -349,7 +349,7 @@ class Run:
             served, prepared = 0, None
             phase, clock = "start", time.perf_counter()
             while True:
-                kind, content = process.heard(limits[phase])
+                kind, content = process.receive(limits[phase])
                 spent = time.perf_counter() - clock
                 clock = time.perf_counter()
                 if kind == "ready":

@@ -12,9 +12,7 @@ from gibench.benchmarks.errors import TrackError
 from gibench.benchmarks.track import MethodPlan
 
 #: Values of knobs that say nothing without the knob's name.
-MUTE = ("none", "off", "on", "auto")
-
-Overrides = Mapping[str, Mapping[str, tuple[Setting, ...]]]  # method → knob → values
+AMBIGUOUS_VALUES = ("none", "off", "on", "auto")
 
 
 @dataclass(frozen=True)
@@ -59,7 +57,7 @@ def label(method: Method, settings: Mapping[str, Setting], plan: MethodPlan) -> 
             continue
         if isinstance(value, bool):
             words.append(knob.name if value else f"no-{knob.name}")
-        elif isinstance(value, str) and value not in MUTE:
+        elif isinstance(value, str) and value not in AMBIGUOUS_VALUES:
             words.append(value)
         else:
             words.append(f"{knob.name}={value:g}" if isinstance(value, float) else f"{knob.name}={value}")

@@ -66,7 +66,7 @@ def run_track(
     from gibench.benchmarks.scoring import Scored, score
     from gibench.benchmarks.settings import parse_overrides
     from gibench.benchmarks.track import load_track
-    from gibench.cli import bench_telling as telling
+    from gibench.cli import bench_printing as printing
     from gibench.cli.dataset import check_variant, scene_options, scene_words
     from gibench.cli.progress import counting
 
@@ -122,15 +122,15 @@ def run_track(
         order,
         work=None if equal_time is None else lambda doing: search(doing, equal_time),
         score=None if no_score else score_and_count,
-        on_state=telling.Teller().tell,
+        on_state=printing.RunPrinter().show,
     )
-    telling.tell_run(root, report)
+    printing.print_run(root, report)
     for done in scored:
-        telling.tell_scored(done)
+        printing.print_scored(done)
     if equal_time is not None:
-        telling.tell_equal_time(root, equal_time)
+        printing.print_equal_time(root, equal_time)
     if not no_score:
-        telling.tell_board(root)
+        printing.print_board(root)
     if report.failed:
         raise RunError(
             f"{len(report.failed)} results failed, `gibench bench list {root}` says why; --retry-failed tries again"
@@ -148,17 +148,17 @@ def list_all(
 ) -> None:
     """List tracks and methods with their knobs, or the results of a run and why some failed."""
     from gibench.benchmarks.errors import TrackError
-    from gibench.cli import bench_telling as telling
+    from gibench.cli import bench_printing as printing
 
     if results is not None:
-        telling.tell_results(results)
+        printing.print_results(results)
     elif show:
         if track is None:
             raise TrackError("--show needs --track, the name of a track")
-        telling.show_track(track)
+        printing.print_track(track)
     else:
-        telling.tell_tracks(track)
-        telling.tell_methods(track)
+        printing.print_tracks(track)
+        printing.print_methods(track)
 
 
 @app.command("score")
@@ -171,7 +171,7 @@ def score_results(
     """Compute what is missing of the metrics, from the predictions on disk."""
     from gibench.benchmarks.result_files import RunFolder
     from gibench.benchmarks.scoring import score
-    from gibench.cli import bench_telling as telling
+    from gibench.cli import bench_printing as printing
     from gibench.cli.dataset import names_in
     from gibench.cli.progress import counting
 
@@ -181,7 +181,7 @@ def score_results(
     with folder.claimed(), counting("results scored") as on_progress:
         scored = score(folder, more=more, on_progress=on_progress, told=telling.remark)
     say(f"{scored.done} files of scores written in {folder.scores}")
-    telling.tell_scored(scored)
+    printing.print_scored(scored)
     if scored.problems:
         raise GibenchError(f"{len(scored.problems)} results could not be scored")
 
@@ -200,16 +200,16 @@ def compare(
     from gibench.benchmarks.errors import ResultsError
     from gibench.benchmarks.report.source import PARTS
     from gibench.benchmarks.results import load
-    from gibench.cli import bench_telling as telling
+    from gibench.cli import bench_printing as printing
     from gibench.metrics import metric as descriptor
 
     if within is not None:
-        telling.tell_methods_compared(load(within), first, second)
+        printing.print_methods_compared(load(within), first, second)
         return
     descriptor(metric)
     if part not in PARTS:
         raise ResultsError(f"--part: '{part}' is not allowed; allowed are {', '.join(PARTS)}")
-    telling.tell_runs_compared(load(first), load(second), metric, part)
+    printing.print_runs_compared(load(first), load(second), metric, part)
 
 
 @app.command("report")
@@ -225,9 +225,9 @@ def report(
     ] = None,
 ) -> None:
     """Write one page, CSV files, tables and plots of one run or more, or unpack those that were packed."""
-    from gibench.cli.bench_reporting import write_and_tell
+    from gibench.cli.bench_reporting import write_and_print
 
-    write_and_tell(results, out, archive)
+    write_and_print(results, out, archive)
 
 
 def _methods(names: str | None, track: str, plans: dict[str, Any]) -> list[Found]:

@@ -10,7 +10,7 @@ from gibench.cli.output import say
 from gibench.errors import GibenchError
 
 
-def write_and_tell(results: Sequence[Path], out: Path | None, archive: Path | None) -> None:
+def write_and_print(results: Sequence[Path], out: Path | None, archive: Path | None) -> None:
     """Write what was asked for and say where it is.
 
     results: runs, or a file that `archive` made. out: a folder for the page. archive: a file to pack it into. Raises

@@ -21,7 +21,7 @@ def convert(
     define: Parameters = None,
 ) -> None:
     """Write a scene for Mitsuba 3: Z up, metres, with all its files, and say what was changed."""
-    from gibench.cli.making import tell_scene
+    from gibench.cli.making import print_scene
     from gibench.generators.imported.errors import SceneFileError
     from gibench.generators.imported.room import describe, import_room, write_imported_room
     from gibench.generators.imported.scene import ImportSettings, import_scene
@@ -41,5 +41,5 @@ def convert(
         write_imported_room(room, out, max_depth=read.max_depth, resolution=read.resolution, spp=64)
     except OSError as problem:
         raise SceneFileError(f"{problem.filename or out}: {problem.strerror}") from None
-    tell_scene(describe(room))
+    print_scene(describe(room))
     say(str(out / "scene.xml"))

@@ -145,9 +145,9 @@ def make(
     check_variant(variant)
     root = out or Path("data") / (recipe.stem if recipe is not None else preset or "small")
     if dry_run:
-        from gibench.cli.making import dry_run as estimate_and_tell
+        from gibench.cli.making import dry_run as estimate_and_print
 
-        estimate_and_tell(chosen, variant, workers)
+        estimate_and_print(chosen, variant, workers)
         return
     given = {
         "--rooms": None if chosen.scenes else chosen.rooms,
@@ -172,10 +172,10 @@ def make(
     }
     words = [str(word) for option, value in given.items() if value is not None for word in (option, value)]
     words += scene_words(scene, up, scale, allow_missing, allow_outside, define)
-    from gibench.cli.making import make_and_tell
+    from gibench.cli.making import make_and_print
 
     command = shlex.join(["make-dataset", *words])
-    make_and_tell(root, chosen, variant, workers, command, cluster)
+    make_and_print(root, chosen, variant, workers, command, cluster)
 
 
 @app.command()

@@ -29,7 +29,7 @@ def doctor(as_json: Annotated[bool, typer.Option("--json", help="For programs.")
     if as_json:
         say(json.dumps(facts, indent=1, ensure_ascii=False))
     else:
-        _tell(facts)
+        _print(facts)
     if facts["variant"] is None:
         raise typer.Exit(1)
 
@@ -87,7 +87,7 @@ def _weights() -> dict[str, str]:
     return {"state": found.state, "detail": found.detail, "command": found.command}
 
 
-def _tell(facts: dict[str, Any]) -> None:
+def _print(facts: dict[str, Any]) -> None:
     llvm, machine = facts["llvm"], facts["machine"]
     memory = machine["memory"] / 2**30
     rows = {

@@ -22,7 +22,7 @@ MOVING = {"camera": "the camera moves", "light": "the light moves", "both": "cam
 QUIET_RULES = ("property_names", "transform_tags")
 
 
-def make_and_tell(
+def make_and_print(
     root: Path, recipe: Recipe, variant: str, workers: int, command: str, cluster: str | None = None
 ) -> None:
     """Make a dataset with a progress bar, then say what there is."""
@@ -86,9 +86,9 @@ def describe(root: Path, manifest: dict[str, Any]) -> None:
             )
         if totals["invalid_paths"]:
             say(_row("invalid paths", f"{totals['invalid_paths']}, counted as 0"))
-    _tell_rejections(manifest.get("rejections", {}), manifest["rejected_rooms"])
+    _print_rejections(manifest.get("rejections", {}), manifest["rejected_rooms"])
     if recipe.get("scenes"):
-        _tell_scenes(root)
+        _print_scenes(root)
     versions = manifest["versions"]
     say(
         _row(
@@ -106,7 +106,7 @@ def dry_run(recipe: Recipe, variant: str, workers: int) -> None:
         result = estimate(recipe, variant=variant, workers=workers, on_room=on_room)
     most = "at most " if recipe.spp is None else "about "
     say(_row("rooms", f"{result.rooms} built and checked, {1000 * result.build_seconds:.0f} ms each"))
-    _tell_rejections(result.rejections, result.rejected_rooms)
+    _print_rejections(result.rejections, result.rejected_rooms)
     say(_row("frames", f"{result.frames}, about {result.seconds_per_frame:.2g} s each"))
     speed = amount(result.paths_per_second, "paths/s")
     say(_row("time", f"{most}{duration(result.seconds)} ({result.variant}, {speed})"))
@@ -127,16 +127,16 @@ def _gloss(root: Path) -> str:
     return f"much, {100 * sum(seen) / len(seen):.0f} % of what cameras see" if seen else "much"
 
 
-def _tell_scenes(root: Path) -> None:
+def _print_scenes(root: Path) -> None:
     for room in whole_rooms(root):
         path = room_folder(root, room) / "room.json"
         try:
-            tell_scene(parsed(gate.read_inside(root, path.relative_to(root)), Described))
+            print_scene(parsed(gate.read_inside(root, path.relative_to(root)), Described))
         except (gate.GateError, ValueError) as problem:
             say(_row("scene", f"{path} is damaged: {problem}"))
 
 
-def tell_scene(described: dict[str, Any]) -> None:
+def print_scene(described: dict[str, Any]) -> None:
     """Say what was done to an imported scene, from its room.json, which holds all of it."""
     source = described["source"]
     changes = sum(change["count"] for change in source["changes"])
@@ -151,7 +151,7 @@ def tell_scene(described: dict[str, Any]) -> None:
             say(_row("", f"{mark}{change['what']}{times}"))
 
 
-def _tell_rejections(rejections: dict[str, int], rooms: dict[Any, str]) -> None:
+def _print_rejections(rejections: dict[str, int], rooms: dict[Any, str]) -> None:
     if rejections:
         listed = ", ".join(
             f"{reason} {count}" for reason, count in sorted(rejections.items(), key=lambda r: -r[1])

@@ -83,8 +83,8 @@ class _Worker:
     rooms_left: float
     room: int | None = None
     ready: bool = False
-    heard: float = field(default_factory=time.monotonic)
-    computed: float = field(default_factory=time.monotonic)
+    last_message: float = field(default_factory=time.monotonic)
+    last_computed: float = field(default_factory=time.monotonic)
     seconds: float = 0.0
     hung: str = ""
 
@@ -103,23 +103,23 @@ def run_rooms(work: Work, rooms: Iterable[int], listener: Listener, *, workers: 
     """
     left = deque(rooms)
     deaths: set[int] = set()
-    crew: list[_Worker] = []
+    running: list[_Worker] = []
     watch = _Watch()
     try:
-        while left or any(worker.room is not None for worker in crew):
-            idle = sum(worker.room is None for worker in crew)
-            while len(crew) < workers and idle < len(left):
-                crew.append(_hired(work))
+        while left or any(worker.room is not None for worker in running):
+            idle = sum(worker.room is None for worker in running)
+            while len(running) < workers and idle < len(left):
+                running.append(_start_worker(work))
                 idle += 1
-            for worker in crew:
+            for worker in running:
                 if worker.ready and worker.room is None and left:
                     worker.room = left.popleft()
-                    worker.heard = worker.computed = time.monotonic()
+                    worker.last_message = worker.last_computed = time.monotonic()
                     with contextlib.suppress(OSError):  # it has just died, and is heard of below
                         worker.connection.send(worker.room)
-            wait([worker.connection for worker in crew], timeout=LOOK_SECONDS)
-            watch.look(crew)
-            for worker in [w for w in crew if w.hung or w.connection.poll()]:
+            wait([worker.connection for worker in running], timeout=LOOK_SECONDS)
+            watch.look(running)
+            for worker in [w for w in running if w.hung or w.connection.poll()]:
                 try:
                     if worker.hung:
                         worker.process.kill()
@@ -127,16 +127,16 @@ def run_rooms(work: Work, rooms: Iterable[int], listener: Listener, *, workers: 
                         raise EOFError
                     kind, content = worker.connection.recv()
                 except (EOFError, OSError):
-                    crew.remove(worker)
-                    left.extendleft(_room_of_the_dead(worker, work, deaths, listener))
+                    running.remove(worker)
+                    left.extendleft(_rooms_to_retry(worker, work, deaths, listener))
                     continue
-                watch.heard(worker)
-                if _heard(worker, kind, content, listener):
-                    crew.remove(worker)
+                watch.note_message(worker)
+                if _handle(worker, kind, content, listener):
+                    running.remove(worker)
     finally:
-        for worker in crew:
+        for worker in running:
             worker.process.kill()
-        for worker in crew:
+        for worker in running:
             worker.process.join()
             worker.connection.close()
 
@@ -148,34 +148,32 @@ class _Watch:
         self.longest = 0.0
         self.looked = time.monotonic()
 
-    def heard(self, worker: _Worker) -> None:
+    def note_message(self, worker: _Worker) -> None:
         now = time.monotonic()
         # What the setup takes, which loads a renderer, says nothing about rooms.
         if worker.ready and worker.room is not None:
-            self.longest = max(self.longest, now - worker.heard)
-        worker.heard = worker.computed = now
+            self.longest = max(self.longest, now - worker.last_message)
+        worker.last_message = worker.last_computed = now
 
-    def look(self, crew: list[_Worker]) -> None:
+    def look(self, running: list[_Worker]) -> None:
         now = time.monotonic()
         if now - self.looked < LOOK_SECONDS:
             return
         if now - self.looked > 5 * LOOK_SECONDS:  # this process was stopped itself, and so, likely, were they
-            for worker in crew:
-                worker.heard = worker.computed = now
+            for worker in running:
+                worker.last_message = worker.last_computed = now
         self.looked = now
-        for worker in crew:
+        for worker in running:
             seconds = _processor_seconds(worker.process)
             if seconds is None or seconds - worker.seconds > COMPUTING or not worker.busy:
-                worker.computed, worker.seconds = now, seconds or worker.seconds
+                worker.last_computed, worker.seconds = now, seconds or worker.seconds
             limit = max(COMPUTING_PATIENCE, SILENCES * self.longest) if self.longest else float("inf")
             if not worker.busy or worker.connection.poll():
                 continue
-            if now - worker.heard > limit:
-                worker.hung = (
-                    f"said nothing for {now - worker.heard:.0f} s, {SILENCES} times as long as ever before"
-                )
-            elif now - worker.computed > PATIENCE:
-                worker.hung = f"hangs: it has not computed anything for {now - worker.computed:.0f} s"
+            if now - worker.last_message > limit:
+                worker.hung = f"said nothing for {now - worker.last_message:.0f} s, {SILENCES} times as long as ever before"
+            elif now - worker.last_computed > PATIENCE:
+                worker.hung = f"hangs: it has not computed anything for {now - worker.last_computed:.0f} s"
 
 
 def _processor_seconds(process: BaseProcess) -> float | None:
@@ -193,7 +191,7 @@ def _whose(worker: _Worker, work: Work) -> str:
     return "a worker " if worker.room is None else f"{work.place(worker.room)}: its worker "
 
 
-def _heard(worker: _Worker, kind: str, content: Any, listener: Listener) -> bool:
+def _handle(worker: _Worker, kind: str, content: Any, listener: Listener) -> bool:
     """Pass a message on; True when the worker has done its share and was sent home."""
     if kind == "ready":
         worker.ready = True
@@ -219,7 +217,7 @@ def _heard(worker: _Worker, kind: str, content: Any, listener: Listener) -> bool
     return True
 
 
-def _room_of_the_dead(worker: _Worker, work: Work, deaths: set[int], listener: Listener) -> list[int]:
+def _rooms_to_retry(worker: _Worker, work: Work, deaths: set[int], listener: Listener) -> list[int]:
     """Rooms to do again after a worker's death: the one in hand, if any. Raises `MakingError` the second time."""
     worker.process.join()
     code = worker.process.exitcode or 0
@@ -242,7 +240,7 @@ def _room_of_the_dead(worker: _Worker, work: Work, deaths: set[int], listener: L
     return [worker.room]
 
 
-def _hired(work: Work) -> _Worker:
+def _start_worker(work: Work) -> _Worker:
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     process = context.Process(target=_worker, args=(theirs, work), daemon=True)

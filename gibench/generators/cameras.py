@@ -18,7 +18,7 @@ from scipy.interpolate import CubicSpline
 from gibench.errors import GibenchError
 from gibench.generators.parts import Camera, FloatArray
 from gibench.generators.trajectories import NoFarView, Spread, differences, spread_stills
-from gibench.generators.view_checks import View, judge
+from gibench.generators.view_checks import View, check_views
 from gibench.generators.visibility import Caster
 
 HEIGHTS = (1.2, 1.8)  # of the camera above the floor, m
@@ -66,7 +66,7 @@ class Stage:
     """What cameras need to know of a room.
 
     free: polygon of the ground where a camera may stand. things: (N, 3) middles of what is worth looking at.
-    shell_owners: see `view_checks.judge`.
+    shell_owners: see `view_checks.check_views`.
     """
 
     def __init__(
@@ -83,9 +83,9 @@ class Stage:
         self.caster, self.shell_owners = caster, shell_owners
         shapely.prepare(self.free)
 
-    def judge(self, cameras: Sequence[Camera]) -> list[View]:
-        """See `view_checks.judge`."""
-        return judge(self.caster, cameras, self.shell_owners)
+    def check(self, cameras: Sequence[Camera]) -> list[View]:
+        """See `view_checks.check_views`."""
+        return check_views(self.caster, cameras, self.shell_owners)
 
     def points(self, rng: np.random.Generator, count: int) -> FloatArray:
         """(count, 2) points spread over the free floor."""
@@ -150,7 +150,7 @@ def sample_spread(
 
 def _candidates(rng: np.random.Generator, stage: Stage) -> tuple[list[View], Counter[str]]:
     """Views anywhere that pass, of a batch, and how many did not, by reason."""
-    views = stage.judge([_candidate(rng, stage, xy) for xy in stage.points(rng, BATCH)])
+    views = stage.check([_candidate(rng, stage, xy) for xy in stage.points(rng, BATCH)])
     return [v for v in views if not v.reason], Counter(v.reason for v in views if v.reason)
 
 
@@ -206,7 +206,7 @@ def sample_path(
             camera_at((float(p[0]), float(p[1]), z), float(a), pitch, fov, kind, step)
             for step, (p, a) in enumerate(zip(xy, yaw, strict=True))
         ]
-        reason = next((v.reason for v in stage.judge(cameras) if v.reason), "")
+        reason = next((v.reason for v in stage.check(cameras) if v.reason), "")
         if not reason:
             return tuple(cameras), refused
         refused[f"{kind}: {reason}"] += 1

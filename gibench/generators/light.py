@@ -16,7 +16,6 @@ KELVIN_RANGE = (1000.0, 25000.0)
 
 BULB_LUMENS = (450.0, 1600.0)  # what a 40 W to a 100 W incandescent bulb gave
 ROOM_LUMENS = (1500.0, 6000.0)
-BULB_KELVIN = (2700.0, 6500.0)
 
 # The white tones that shops sell, and how often a home has them.
 _TONES = (2700.0, 3000.0, 3500.0, 4000.0, 5000.0, 6500.0)

@@ -1,4 +1,4 @@
-"""Whether a view is worth rendering, judged by a coarse grid of rays."""
+"""Whether a view is worth rendering, checked by a coarse grid of rays."""
 
 from __future__ import annotations
 
@@ -46,8 +46,8 @@ def camera_rays(cameras: Sequence[Camera], grid: tuple[int, int] = GRID) -> Floa
     return rays.reshape(len(cameras), -1, 3)
 
 
-def judge(caster: Caster, cameras: Sequence[Camera], shell_owners: int) -> list[View]:
-    """Cast the grids of all candidates at once and judge each.
+def check_views(caster: Caster, cameras: Sequence[Camera], shell_owners: int) -> list[View]:
+    """Cast the grids of all candidates at once and check each.
 
     shell_owners: owners below this number are the shell's and do not count as things seen.
     """

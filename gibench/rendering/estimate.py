@@ -203,10 +203,10 @@ def _traced(
     if guides:
         finite &= dr.all(dr.isfinite(path.albedo + path.normal))
     # Divided before they are summed, so that huge radiance does not overflow on the way.
-    share = 1 / dr.opaque(mi.Float, samples)
-    parts = {name: dr.select(finite, value * share, 0) for name, value in parts.items()}
+    per_sample = 1 / dr.opaque(mi.Float, samples)
+    parts = {name: dr.select(finite, value * per_sample, 0) for name, value in parts.items()}
     if guides:
-        parts |= {name: dr.select(finite, getattr(path, name) * share, 0) for name in GUIDES}
+        parts |= {name: dr.select(finite, getattr(path, name) * per_sample, 0) for name in GUIDES}
     invalid = dr.select(finite, mi.UInt32(0), mi.UInt32(1))
     # One kernel for all of it. A reduction of what is not evaluated yet would trace the paths once more.
     dr.eval(parts, invalid)

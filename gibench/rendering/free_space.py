@@ -95,8 +95,8 @@ def fan(
 
 def enclosed(scene: Scene, points: NDArray[Any]) -> NDArray[np.bool_]:
     """(N,) whether points (N, 3) have something above, below and around them, as in a room."""
-    seen = np.isfinite(fan(scene, points, _enclosing())[0])
-    around, above, below = (part.mean(axis=1) for part in np.split(seen, [RING, RING + CONE], axis=1))
+    hit = np.isfinite(fan(scene, points, _enclosing())[0])
+    around, above, below = (part.mean(axis=1) for part in np.split(hit, [RING, RING + CONE], axis=1))
     return np.asarray((around >= LEAST_AROUND) & (above >= LEAST_ABOVE) & (below >= LEAST_ABOVE))
 
 

@@ -91,8 +91,8 @@ def _motion(hit: Hit, pixel: Any, previous: RayGenerator | None) -> tuple[Any, A
     towards = hit.si.p - origin
     distance = dr.norm(towards)
     ray = mi.Ray3f(origin, towards / distance)
-    seen = hit.scene.mi_scene.ray_intersect_preliminary(ray, coherent=False, active=inside).t
-    visible = inside & (dr.abs(seen - distance) <= VISIBILITY_TOLERANCE * distance)
+    occluder = hit.scene.mi_scene.ray_intersect_preliminary(ray, coherent=False, active=inside).t
+    visible = inside & (dr.abs(occluder - distance) <= VISIBILITY_TOLERANCE * distance)
     return offset, dr.select(visible, mi.Float(1), 0)
 
 
@@ -143,8 +143,8 @@ def _values(
             "curvature_direction": lambda: direction,
         }
     if not set(SETS["motion"]).isdisjoint(wanted):
-        offset, seen = _motion(hit, pixel, previous)
-        names |= {"motion": lambda: offset, "motion_valid": lambda: seen}
+        offset, visible = _motion(hit, pixel, previous)
+        names |= {"motion": lambda: offset, "motion_valid": lambda: visible}
     return {name: names[name]() for name in CHANNELS if name in wanted}
 
 

@@ -2,7 +2,7 @@
 
 The first hit is handled outside the loop. There the diffuse lobe is evaluated on its own, so a path carries two
 weights, one for the diffuse reflection and one for everything else; the rest of the path is shared by both. What the
-second vertex emits is direct light, all that comes later is indirect.
+second vertex emits is direct light, all that is scattered there is indirect.
 
 Multiple importance sampling with the balance-heuristic power 2 (Veach 1997, section 9.2.4), next-event
 estimation at every vertex, Russian roulette from `RR_DEPTH` on.
@@ -89,15 +89,15 @@ def _follow(
 
     reference: where the ray starts (mi.Interaction3f); row: of the guide there; pdf, delta: of the direction taken;
     expected: throughput so far as the BSDFs alone would sample it, for Russian roulette; eta: relative index of
-    refraction so far; depth: scattering events so far. Returns emission met at the end of the ray, and everything
-    later.
+    refraction so far; depth: scattering events so far. Returns the emission at the end of the ray, and all
+    light that is scattered there towards its start.
     """
     context = mi.BSDFContext()
     ray = mi.Ray3f(ray)
     reference = mi.Interaction3f(reference)
     row, pdf, delta = mi.UInt32(row), mi.Float(pdf), mi.Bool(delta)
     expected, eta, active = mi.Spectrum(expected), mi.Float(eta), mi.Bool(active)
-    met, later = mi.Spectrum(0), mi.Spectrum(0)
+    first_emission, scattered = mi.Spectrum(0), mi.Spectrum(0)
     throughput = mi.Spectrum(1)
     depth = mi.UInt32(depth)
     first = mi.Bool(True)
@@ -108,8 +108,8 @@ def _follow(
         # Emission at this vertex, weighted against the light sampling of the vertex before it.
         weight = emission_weight(scene, portals, guide, si, reference, row, pdf, delta, active)
         emitted = throughput * emission(scene, si, active) * weight
-        met += dr.select(first, emitted, 0)
-        later += dr.select(first, 0, emitted)
+        first_emission += dr.select(first, emitted, 0)
+        scattered += dr.select(first, 0, emitted)
         first = mi.Bool(False)
 
         active &= si.is_valid() & (depth < max_depth)
@@ -126,12 +126,14 @@ def _follow(
             context, si, to_light, sampler.next_1d(), sampler.next_2d(), active
         )
         if dr.hint(guide is not None, mode="scalar"):
-            share = guide.share(row, bsdf, active)
-            light_bounce_pdf = guide.mixed_density(row, share, light.direction, light_bounce_pdf, lit)
+            guide_fraction = guide.fraction(row, bsdf, active)
+            light_bounce_pdf = guide.mixed_density(
+                row, guide_fraction, light.direction, light_bounce_pdf, lit
+            )
         value = si.to_world_mueller(value, -to_light, si.wi)
         weight = dr.select(light.delta, 1, mis_weight(light.pdf, light_bounce_pdf))
         reflected = dr.select(lit, value * light.weight * weight, 0)
-        later += throughput * reflected
+        scattered += throughput * reflected
 
         # The next direction.
         bounce_weight = si.to_world_mueller(bounce_weight, -bounce.wo, si.wi)
@@ -142,7 +144,7 @@ def _follow(
         bounce_eta = bounce.eta
         if dr.hint(guide is not None, mode="scalar"):
             direction, bounce_weight, pdf, delta, bounce_eta = guide.bounce(
-                context, si, bsdf, row, share, bounce, bounce_weight, sampler, active
+                context, si, bsdf, row, guide_fraction, bounce, bounce_weight, sampler, active
             )
         depth += 1
         if dr.hint(recorder is not None, mode="scalar"):
@@ -154,7 +156,7 @@ def _follow(
                 pdf,
                 delta,
                 throughput,
-                met + later,
+                first_emission + scattered,
                 light.light,
                 reflected,
                 depth,
@@ -175,7 +177,7 @@ def _follow(
         throughput *= spared
         expected *= spared
 
-    return met, later
+    return first_emission, scattered
 
 
 def follow_paths(scene, sampler, ray, *, max_depth: int, portals=None, guide=None, recorder=None):
@@ -236,10 +238,10 @@ def scatter_paths(
     direction, pdf, eta, expected = si.to_world(bounce.wo), bounce.pdf, bounce.eta, _as_expected(weight)
     delta = mi.has_flag(bounce.sampled_type, mi.BSDFFlags.Delta)
     if guide is not None:
-        share = guide.share(row, bsdf, active)
-        light_bounce_pdf = guide.mixed_density(row, share, light.direction, light_bounce_pdf, lit)
+        guide_fraction = guide.fraction(row, bsdf, active)
+        light_bounce_pdf = guide.mixed_density(row, guide_fraction, light.direction, light_bounce_pdf, lit)
         direction, weight, pdf, delta, eta = guide.bounce(
-            asked, si, bsdf, row, share, bounce, weight, sampler, active
+            asked, si, bsdf, row, guide_fraction, bounce, weight, sampler, active
         )
     mis = dr.select(light.delta, 1, mis_weight(light.pdf, light_bounce_pdf))
     incident = dr.select(lit, light.weight * mis, 0)

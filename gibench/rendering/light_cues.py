@@ -92,9 +92,9 @@ def light_cues(scene: Scene, sampler: Any, rays: Any) -> dict[str, Any]:
     # A guide learns where light comes from for the scene's own materials; these are others.
     light = sample_light(mi_scene, portals, None, si, mi.UInt32(0), sampler, active)
     to_light = si.to_local(light.direction)
-    share = dr.select(light.delta, 1, mis_weight(light.pdf, density(to_light)))
+    mis = dr.select(light.delta, 1, mis_weight(light.pdf, density(to_light)))
     lit = active & (light.pdf != 0)
-    sums = [dr.select(lit, value * light.weight * share, 0) for value in values(to_light, lit)]
+    sums = [dr.select(lit, value * light.weight * mis, 0) for value in values(to_light, lit)]
 
     choice, u = sampler.next_1d(), sampler.next_2d()
     bounce = dr.select(own, mi.warp.square_to_cosine_hemisphere(u), bases.sample(choice, u))
@@ -104,9 +104,9 @@ def light_cues(scene: Scene, sampler: Any, rays: Any) -> dict[str, Any]:
     met = mi_scene.ray_intersect(si.spawn_ray(si.to_world(bounce)), mi.RayFlags.All, False, onward)
     reference, row = mi.Interaction3f(si), mi.UInt32(0)
     weight = emission_weight(mi_scene, portals, None, met, reference, row, pdf, mi.Bool(False), onward)
-    seen = emission(mi_scene, met, onward) * weight * inverse(pdf)
+    emitted = emission(mi_scene, met, onward) * weight * inverse(pdf)
     for number, value in enumerate(values(bounce, onward)):
-        sums[number] += dr.select(onward, value * seen, 0)
+        sums[number] += dr.select(onward, value * emitted, 0)
 
     found: dict[str, Any] = dict(zip(CUES, sums, strict=True))
     albedo = dr.clip(bsdf.eval_diffuse_reflectance(si, own), 0, 1)
@@ -131,8 +131,8 @@ def cue_images(
     values = light_cues(scene, sampler, ray_generator(camera).rays(corner + sampler.next_2d()))
     # A sample that overflows counts as black. Shares are summed, so that huge radiance does not overflow on the way.
     finite = dr.all(dr.isfinite(sum(values[name] for name in CUES)))
-    share = dr.rcp(dr.opaque(mi.Float, spp))
-    values = {name: dr.select(finite, value * share, 0) for name, value in values.items()}
+    per_sample = dr.rcp(dr.opaque(mi.Float, spp))
+    values = {name: dr.select(finite, value * per_sample, 0) for name, value in values.items()}
     # One kernel for all of it. A reduction of what is not evaluated yet would trace the samples once more.
     dr.eval(values)
     sums = {name: type(value)(*(dr.block_sum(c, spp) for c in value)) for name, value in values.items()}

@@ -33,8 +33,9 @@ def mis_weight(pdf_a, pdf_b):
 class LightSample:
     """A direction to a light that the vertex sees.
 
-    direction: unit, world space. pdf: density per steradian, 0 where there is no light. delta: whether nothing but this
-    could have found it. weight: radiance over density. light: number of the light, where a guide has chosen it.
+    direction: unit, world space. pdf: density per steradian, 0 where there is no light. delta: whether the light is a
+    point or a single direction, which no bounce meets. weight: radiance over density. light: number of the light, where
+    a guide has chosen it.
     """
 
     direction: Any
@@ -66,7 +67,7 @@ def emission_weight(scene, portals, guide, si, reference, row, pdf, delta, activ
     light_pdf = scene.pdf_emitter_direction(reference, towards, active)
     if portals is not None:
         by_portal = dr.select(emitter == portals.environment, portals.density(reference.p, towards.d), 0)
-        light_pdf = dr.lerp(light_pdf, by_portal, portals.share)
+        light_pdf = dr.lerp(light_pdf, by_portal, portals.fraction)
     return mis_weight(pdf, light_pdf)
 
 
@@ -78,9 +79,9 @@ def sample_light(scene, portals, guide, si, row, sampler, active) -> LightSample
     if portals is None:
         sample, weight = scene.sample_emitter_direction(si, u, True, active)
         return LightSample(sample.d, sample.pdf, sample.delta, weight)
-    share = portals.share
-    entering = active & (u.x < share)
-    u = mi.Point2f(dr.select(entering, u.x / share, (u.x - share) / (1 - share)), u.y)
+    fraction = portals.fraction
+    entering = active & (u.x < fraction)
+    u = mi.Point2f(dr.select(entering, u.x / fraction, (u.x - fraction) / (1 - fraction)), u.y)
     sample, light = scene.sample_emitter_direction(si, u, False, active & (entering ^ True))
     through = portals.sample(si.p, u)
     entering &= dr.any(through != 0)
@@ -100,7 +101,7 @@ def sample_light(scene, portals, guide, si, row, sampler, active) -> LightSample
     to_environment = entering | (sample.emitter == portals.environment)
     by_portal = dr.select(to_environment, portals.density(si.p, direction), 0)
     delta = sample.delta & (entering ^ True)
-    mixed = dr.lerp(pdf, by_portal, share)
+    mixed = dr.lerp(pdf, by_portal, fraction)
     chosen = active & (mixed > 0) & (entering | (sample.pdf > 0))
     chosen &= scene.ray_test(ray, chosen) ^ True
     return LightSample(

@@ -17,7 +17,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-SHARE = 0.5
+PORTAL_FRACTION = 0.5
 """Of the light samples that go through portals where there are any. The environment has half of the rest."""
 
 _COLUMNS = 19
@@ -62,8 +62,8 @@ class Portals:
 
     def open(self, bright: bool) -> None:
         """Sample through the portals where the environment is bright, and not where it is dark."""
-        self.share = mi.Float(SHARE if bright and self._any else 0.0)
-        dr.make_opaque(self.share)
+        self.fraction = mi.Float(PORTAL_FRACTION if bright and self._any else 0.0)
+        dr.make_opaque(self.fraction)
 
     def _row(self, portal, column):
         offset = portal * _COLUMNS + column

@@ -8,7 +8,7 @@ import mitsuba as mi
 import numpy as np
 
 from gibench.generators.parts import Camera
-from gibench.generators.view_checks import camera_rays, judge
+from gibench.generators.view_checks import camera_rays, check_views
 from gibench.generators.visibility import RayCaster
 from gibench.rendering.camera import CameraError, PinholeCamera
 from gibench.rendering.render import render_frame
@@ -133,7 +133,7 @@ def inside_of_something() -> Found:
     for half in (0.05, 0.4, 0.9):
         solid = (vertices * half, faces[:, ::-1])
         caster = RayCaster([room, solid, *things], range(42))
-        views = judge(caster, [Camera((0.0, 0.0, 0.0), (1.0, 0.2, 0.1), 1.2)], 1)
+        views = check_views(caster, [Camera((0.0, 0.0, 0.0), (1.0, 0.2, 0.1), 1.2)], 1)
         passed = float(views[0].reason == "")
         yield Check(
             "checks", f"views from inside a cube of {200 * half:g} cm let pass", passed, 0, "docs/rooms.md"

@@ -42,9 +42,6 @@ PRINCIPLED = _principled(roughness=0.55, specular=0.5)
 BUMPS = {"type": "bumps"}
 """Stands for a slope of 1 in 50 over each triangle, as a displacement; `room` makes it, since it needs a renderer."""
 
-TURNED = {"type": "rgb", "value": [0.55, 0.5, 0.98]}
-"""A normal map that leans by 6°."""
-
 MATERIALS: dict[str, dict[str, Any]] = {
     "diffuse": MATT,
     "roughplastic": PLASTIC,

@@ -93,7 +93,7 @@ def run(
     done: list[str] = []
     left: list[Case] | None = None
     while left is None or left:
-        connection, process = _hired(quick, only, done)
+        connection, process = _start(quick, only, done)
         try:
             while True:
                 kind, content = connection.recv()
@@ -129,7 +129,7 @@ def chosen(quick: bool, only: str) -> list[Case]:
     return [one for one in all_cases() if (one.quick or not quick) and only in one.name]
 
 
-def _hired(quick: bool, only: str, done: Sequence[str]) -> tuple[Connection, BaseProcess]:
+def _start(quick: bool, only: str, done: Sequence[str]) -> tuple[Connection, BaseProcess]:
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     process = context.Process(target=_work, args=(theirs, quick, only, tuple(done)), daemon=True)

@@ -25,7 +25,7 @@ def toys_installed(monkeypatch):
     points.append(EntryPoint("gone", "no.such.module:METHOD", registry.GROUP))
     offered = registry.registry_of(points)
     monkeypatch.setattr(registry, "installed", lambda: offered)
-    for name in ("gibench.cli.bench_telling",):
+    for name in ("gibench.cli.bench_printing",):
         if name in sys.modules:
             monkeypatch.setattr(sys.modules[name], "installed", lambda: offered)
 

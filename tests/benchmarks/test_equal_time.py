@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from gibench.benchmarks.equal_time import dearest_within, search
+from gibench.benchmarks.equal_time import last_within, search
 from gibench.benchmarks.result_files import RunFolder
 from gibench.benchmarks.running import run
 from tests.benchmarks import toys
@@ -19,7 +19,7 @@ def test_bisection_finds_the_dearest_that_fits(count):
             asked.append(value)
             return 0.0 if value <= fits else 1.0
 
-        assert dearest_within(values, 0.5, measure) == fits
+        assert last_within(values, 0.5, measure) == fits
         assert len(asked) == len(set(asked)) <= math.ceil(math.log2(count + 1))
         assert fits < 0 or fits in asked
         assert fits == count - 1 or fits + 1 in asked

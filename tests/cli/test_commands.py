@@ -70,7 +70,7 @@ def test_preview_draws_a_sheet_or_a_frame(made, capsys, tmp_path):
 
 def test_the_recorded_command_makes_the_same_again(monkeypatch, tmp_path):
     asked = []
-    monkeypatch.setattr("gibench.cli.making.make_and_tell", lambda *given: asked.append(given))
+    monkeypatch.setattr("gibench.cli.making.make_and_print", lambda *given: asked.append(given))
     words = ["--preset", "smoke", "--seed", "5", "--resolution", "32x24", "--kind", "office,living"]
     words += [
         "--channels",
@@ -100,7 +100,7 @@ def test_the_recorded_command_makes_the_same_again(monkeypatch, tmp_path):
 
 def test_the_folder_is_named_after_the_recipe(monkeypatch, tmp_path):
     asked = []
-    monkeypatch.setattr("gibench.cli.making.make_and_tell", lambda *given: asked.append(str(given[0])))
+    monkeypatch.setattr("gibench.cli.making.make_and_print", lambda *given: asked.append(str(given[0])))
     (tmp_path / "mine.toml").write_text("rooms = 1\n")
     for words in ([], ["--preset", "paper"], ["--recipe", str(tmp_path / "mine.toml")]):
         assert run(make_app, words) == 0
@@ -120,7 +120,7 @@ def test_ctrl_c_outside_of_making_is_no_traceback(monkeypatch, capsys, tmp_path)
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("gibench.cli.making.make_and_tell", interrupted)
+    monkeypatch.setattr("gibench.cli.making.make_and_print", interrupted)
     assert run(make_app, ["--out", str(tmp_path)]) == 130
 
 

@@ -269,8 +269,8 @@ def test_progress_counts_up_to_the_whole(tmp_path):
 
 def test_workers_are_replaced_after_a_number_of_rooms(tmp_path, monkeypatch):
     hired = []
-    original = pool._hired
-    monkeypatch.setattr(pool, "_hired", lambda work: hired.append(original(work)) or hired[-1])
+    original = pool._start_worker
+    monkeypatch.setattr(pool, "_start_worker", lambda work: hired.append(original(work)) or hired[-1])
     monkeypatch.setattr(pool, "ROOMS_PER_WORKER", 2)
     monkeypatch.setattr(pool._Worker, "__init__", _with_two_rooms(pool._Worker.__init__))
     make_fake(tmp_path / "d", tiny(5, views=1))

@@ -17,7 +17,7 @@ from gibench.generators.cameras import (
 )
 from gibench.generators.grid_solid import box
 from gibench.generators.rooms import sample_room
-from gibench.generators.view_checks import judge
+from gibench.generators.view_checks import check_views
 from gibench.generators.visibility import RayCaster
 
 FREE = shapely.box(-2.2, -2.2, 2.2, 2.2)
@@ -48,7 +48,7 @@ def test_stills_pass_and_differ(stage, seed):
     cameras, refused = sample_stills(np.random.default_rng(seed), stage, 6)
     assert len(cameras) == 6
     assert isinstance(refused, Counter)
-    for view in judge(stage.caster, cameras, 6):
+    for view in check_views(stage.caster, cameras, 6):
         assert view.reason == ""
     for camera in cameras:
         assert FREE.covers(shapely.Point(camera.position[:2]))
@@ -71,7 +71,7 @@ def test_paths_are_smooth_and_every_frame_passes(stage, kind):
     cameras, _ = sample_path(np.random.default_rng(4), stage, kind, frames)
     assert [c.step for c in cameras] == list(range(frames))
     assert {c.path for c in cameras} == {kind}
-    assert all(not view.reason for view in judge(stage.caster, cameras, 6))
+    assert all(not view.reason for view in check_views(stage.caster, cameras, 6))
     places = np.array([c.position for c in cameras])
     steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
     assert (np.ptp(places[:, 2])) < 1e-12

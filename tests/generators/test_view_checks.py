@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gibench.generators.parts import Camera
-from gibench.generators.view_checks import GRID, camera_rays, judge
+from gibench.generators.view_checks import GRID, camera_rays, check_views
 
 EAST = Camera((0.0, 0.0, 1.5), (1.0, 0.0, 1.5), math.radians(90))
 
@@ -28,7 +28,7 @@ def good_view():
 
 
 def reason(distance, owner, shell_owners=2):
-    return judge(Scripted(distance, owner), [EAST], shell_owners)[0].reason
+    return check_views(Scripted(distance, owner), [EAST], shell_owners)[0].reason
 
 
 def test_rays_span_the_field_of_view():
@@ -48,11 +48,11 @@ def test_a_view_along_z_has_rays_and_a_verdict(towards):
     rays = camera_rays([along])[0]
     np.testing.assert_allclose(np.linalg.norm(rays, axis=1), 1)
     assert (rays[:, 2] * towards > 0).all()
-    assert judge(Scripted(*good_view()), [along], 2)[0].reason == ""
+    assert check_views(Scripted(*good_view()), [along], 2)[0].reason == ""
 
 
 def test_a_good_view_passes():
-    view = judge(Scripted(*good_view()), [EAST], 2)[0]
+    view = check_views(Scripted(*good_view()), [EAST], 2)[0]
     assert view.reason == ""
     assert view.objects == 8
 
@@ -69,7 +69,7 @@ def test_many_candidates_are_judged_each_on_its_own():
     distance, owner = good_view()
     close = distance.copy()
     close[17] = 0.49
-    views = judge(
+    views = check_views(
         Scripted(np.concatenate([distance, close]), np.concatenate([owner, owner])), [EAST, EAST], 2
     )
     assert [v.reason for v in views] == ["", "too close"]

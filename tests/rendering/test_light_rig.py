@@ -193,7 +193,7 @@ def test_portals_are_used_where_the_sky_is_bright_and_only_there():
     shares = []
     for lighting in (Lighting(), AREA[0], SKIES[0], AREA[1]):
         rig.set(lighting)
-        shares.append(float(np.array(rig.scene.portals.share)[0]))
+        shares.append(float(np.array(rig.scene.portals.fraction)[0]))
     assert shares == [0.5, 0, 0.5, 0]
     rig.set(SKIES[1])
     with_portals = image(rig.scene, camera=INSIDE, spp=1024)
@@ -204,7 +204,7 @@ def test_portals_are_used_where_the_sky_is_bright_and_only_there():
         replace(load_dict(room(environment=False)), openings=OPENINGS_OF_ROOM), panoramas=False
     )
     without.set(AREA[0])
-    assert float(np.array(without.scene.portals.share)[0]) == 0
+    assert float(np.array(without.scene.portals.fraction)[0]) == 0
 
 
 def test_the_ids_of_all_else_stay_and_the_light_has_the_last():

@@ -51,7 +51,7 @@ def _read_run(root: Path) -> None:
     from gibench.benchmarks.report.tables import write_tables
     from gibench.benchmarks.result_files import RunFolder
     from gibench.benchmarks.results import load
-    from gibench.cli.bench_telling import tell_board, tell_results
+    from gibench.cli.bench_printing import print_board, print_results
 
     folder = RunFolder(root)
     with folder.claimed():
@@ -66,8 +66,8 @@ def _read_run(root: Path) -> None:
         write_csv_files(runs, summary, root)
         write_tables(runs, summary, root)
         statistics.leaderboard(results, results.run["metrics"][0])
-    tell_results(root)
-    tell_board(root)
+    print_results(root)
+    print_board(root)
     for id in folder.ids():
         if results.results.set_index("result")["status"].get(id) == "ok":
             results.prediction(id, 0)

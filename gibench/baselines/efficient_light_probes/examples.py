@@ -108,14 +108,14 @@ def _example(
     resolution = (width, height)
     camera = frame.camera
 
-    def seen(one: PinholeCamera) -> tuple[Tensor, Tensor]:
+    def view_of(one: PinholeCamera) -> tuple[Tensor, Tensor]:
         color, guides, _ = inputs(one, resolution, Stages())
         return color.cpu(), guides.cpu()
 
     forget()
     if not temporal:
         nothing = truth.new_zeros((0, height, width))
-        return Example(*seen(camera), truth, nothing, nothing, nothing, nothing)
+        return Example(*view_of(camera), truth, nothing, nothing, nothing, nothing)
     depth = render_gbuffer(site.scene, camera, resolution, ["depth"])["depth"]
     hit = depth[depth > 0]
     earlier = cameras_before(camera, float(np.median(hit)) if hit.size else 1.0, 1 + len(DECAY), rng)
@@ -123,10 +123,10 @@ def _example(
         site.scene, camera, resolution, ["motion", "motion_valid"], previous_camera=earlier[0]
     )
     for one in reversed(earlier[1:]):
-        seen(one)
-    before, guides_before = seen(earlier[0])
+        view_of(one)
+    before, guides_before = view_of(earlier[0])
     motion, valid = _tensor(moved["motion"]), _tensor(moved["motion_valid"])
-    return Example(*seen(camera), truth, before, guides_before, motion, valid)
+    return Example(*view_of(camera), truth, before, guides_before, motion, valid)
 
 
 def _tensor(image: NDArray[Any]) -> Tensor:

@@ -26,10 +26,10 @@ MAPS = ("radiance", "material_id", "reflected_position", "reflected_material_id"
 def _gbuffer(scene, lightmap, camera, width: int, height: int):
     """What was hit, the light it sends out but for glossy light, and what a search walks over."""
     hits = hits_of_rays(scene, ray_generator(camera), (width, height))
-    seen = hits.emission + lightmap.diffuse(hits.si, hits.preliminary, hits.active)
+    base = hits.emission + lightmap.diffuse(hits.si, hits.preliminary, hits.active)
     surfaces = surfaces_of(scene, hits)
-    dr.eval(hits.preliminary, seen, surfaces)
-    return hits.preliminary, seen, surfaces
+    dr.eval(hits.preliminary, base, surfaces)
+    return hits.preliminary, base, surfaces
 
 
 def _mirrored(scene, _lightmap, camera, preliminary, glossy, width: int, height: int):
@@ -62,14 +62,14 @@ class Searched:
     """What a search finds, a lane a camera ray in row order.
 
     preliminary, mirrored: mi.PreliminaryIntersection3f of camera ray and mirror ray. surfaces: "glossy", "position",
-    "normal" and "material" of the first hits. seen: mi.Color3f, all light but the glossy one, specular: that. made:
+    "normal" and "material" of the first hits. base: mi.Color3f, all light but the glossy one, specular: that. made:
     steps of the searches.
     """
 
     preliminary: Any
     mirrored: Any
     surfaces: dict[str, Any]
-    seen: Any
+    base: Any
     specular: Any
     made: Any
 
@@ -95,7 +95,7 @@ class ReflectionSearch(OnLightmap):
     def searched(self, camera: dict[str, Any], fine: tuple[int, int], stages: Stages) -> Searched:
         """Search a frame. camera: from `camera_arrays`, of a grid of fine = (width, height) rays."""
         with stages.stage("g-buffer"):
-            preliminary, seen, surfaces = self.kernels["g-buffer"](camera, *fine)
+            preliminary, base, surfaces = self.kernels["g-buffer"](camera, *fine)
         with stages.stage("ray casting"):
             target, far, mirrored = self.kernels["mirror"](camera, preliminary, surfaces["glossy"], *fine)
         with stages.stage("search"):
@@ -109,12 +109,12 @@ class ReflectionSearch(OnLightmap):
                 dr.opaque(mi.UInt32, int(self.settings["steps"])),
                 dr.opaque(mi.Float, float(self.settings["tolerance"])),
             )
-        return Searched(preliminary, mirrored, surfaces, seen, specular, made)
+        return Searched(preliminary, mirrored, surfaces, base, specular, made)
 
     def render(self, view: View, stages: Stages) -> Prediction:
         """First hits, what they mirror, and the light of the probes where those mirror the same."""
         fine = self.fine(view)
         found = self.searched(camera_arrays(view.camera, fine), fine, stages)
         with stages.stage("search"):
-            base, specular = (averaged(part, fine, self.grid) for part in (found.seen, found.specular))
+            base, specular = (averaged(part, fine, self.grid) for part in (found.base, found.specular))
         return Prediction(base + specular, specular, extra=found.effort)

@@ -85,7 +85,7 @@ class Reconstruction(ReflectionSearch):
             parts = (depth, found.surfaces["normal"], albedo, reflected)
             guides = torch.cat([as_image(part, fine, grid) for part in parts])
         with stages.stage("temporal"):
-            color = mi.Color3f(found.seen + found.specular)
+            color = mi.Color3f(found.base + found.specular)
             if self.settings["temporal"]:
                 color = self._with_the_past(arrays, found.surfaces, color, fine)
             return as_image(color, fine, grid), guides, found.effort

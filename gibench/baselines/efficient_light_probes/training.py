@@ -149,7 +149,7 @@ class Crops(NamedTuple):
 
     examples: list[Example]
     windows: list[Window]
-    seen: Window | None
+    perceptual: Window | None
 
 
 class Reconstructing(Learner):
@@ -164,7 +164,7 @@ class Reconstructing(Learner):
         with seeded(plan.seed):
             self.network = ReconstructionNetwork(plan.fusion)
         self.network.to(device)
-        self.judge = build_network("vgg").to(device) if plan.lpips else None
+        self.lpips_network = build_network("vgg").to(device) if plan.lpips else None
         optimiser = torch.optim.Adam(self.network.parameters(), lr=RATE)
         super().__init__({"network": self.network}, {"network": optimiser})
 
@@ -206,10 +206,10 @@ class Reconstructing(Learner):
 
     def _crops(self, chosen: list[Example], step: int, generator: np.random.Generator) -> Crops:
         windows = [random_window(one.truth.shape[-2:], self.plan.crop, generator) for one in chosen]
-        seen = None
-        if self.judge is not None and step % PERCEPTUAL_EVERY == 0:
-            seen = random_window(windows[0][2:], PERCEPTUAL_SIDE, generator)
-        return Crops(chosen, windows, seen)
+        perceptual = None
+        if self.lpips_network is not None and step % PERCEPTUAL_EVERY == 0:
+            perceptual = random_window(windows[0][2:], PERCEPTUAL_SIDE, generator)
+        return Crops(chosen, windows, perceptual)
 
     def error(self) -> Tensor:
         """Of the held-out view: mean absolute difference of compressed radiance."""
@@ -244,8 +244,8 @@ class Reconstructing(Learner):
         loss = losses.ABSOLUTE * absolute(output, scale.compressed(truth))
         if self.plan.temporal:
             loss = loss + losses.TEMPORAL * losses.temporal(output, outputs[1], motion, valid)
-        if self.judge is not None and batch.seen is not None:
-            part, known = (batch.seen.of(image[:1]) for image in (output, truth))
-            seen = losses.perceptual(self.judge, scale.radiance(part), known, scale.exposure)
-            loss = loss + PERCEPTUAL_EVERY * losses.PERCEPTUAL * seen
+        if self.lpips_network is not None and batch.perceptual is not None:
+            part, known = (batch.perceptual.of(image[:1]) for image in (output, truth))
+            lpips = losses.perceptual(self.lpips_network, scale.radiance(part), known, scale.exposure)
+            loss = loss + PERCEPTUAL_EVERY * losses.PERCEPTUAL * lpips
         return loss

@@ -47,8 +47,8 @@ def recalled(frame: Frame, point: Any, material: Any, active: Any) -> tuple[Any,
     active &= (at.x >= 0) & (at.y >= 0) & (at.x < frame.width) & (at.y < frame.height)
     column, row = mi.Int32(dr.select(active, at.x, 0)), mi.Int32(dr.select(active, at.y, 0))
     lane = mi.UInt32(row * frame.width + column)
-    seen = active & dr.gather(mi.Bool, frame.known, lane, active)
-    seen &= dr.gather(mi.UInt32, frame.material, lane, active) == material
+    found = active & dr.gather(mi.Bool, frame.known, lane, active)
+    found &= dr.gather(mi.UInt32, frame.material, lane, active) == material
     there = dr.gather(mi.Point3f, frame.position, lane, active)
-    seen &= dr.norm(there - point) <= APART * depth * camera.scale
-    return dr.gather(mi.Color3f, frame.color, lane, seen), seen
+    found &= dr.norm(there - point) <= APART * depth * camera.scale
+    return dr.gather(mi.Color3f, frame.color, lane, found), found

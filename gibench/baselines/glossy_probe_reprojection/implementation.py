@@ -48,13 +48,13 @@ RECALLED = 1.0
 def _gbuffer(scene, lightmap, camera, width: int, height: int):
     """What was hit, the light it sends out but for glossy light, and what search and filter know of it."""
     hits = hits_of_rays(scene, ray_generator(camera), (width, height))
-    seen = hits.emission + lightmap.diffuse(hits.si, hits.preliminary, hits.active)
+    base = hits.emission + lightmap.diffuse(hits.si, hits.preliminary, hits.active)
     surfaces = surfaces_of(scene, hits) | {
         "roughness": surface.roughness(scene, hits.bsdf, hits.si, hits.active),
         "distance": dr.select(hits.active, hits.si.t, 0),
     }
-    dr.eval(hits.preliminary, seen, surfaces)
-    return hits.preliminary, seen, surfaces
+    dr.eval(hits.preliminary, base, surfaces)
+    return hits.preliminary, base, surfaces
 
 
 def _bent(scene, camera, preliminary, width: int, height: int):
@@ -104,8 +104,8 @@ def _gathered(table, chosen, shares, number, eye, surfaces, mirrored, search, pa
 def _recalled(frame, surfaces, color, energy):
     """The same, with the frame before where no probe has anything."""
     missing = surfaces["glossy"] & (energy >= NOTHING)
-    old, seen = recalled(Frame(**frame), surfaces["position"], surfaces["material"], missing)
-    result = dr.select(seen, old, color), dr.select(seen, RECALLED, energy)
+    old, found = recalled(Frame(**frame), surfaces["position"], surfaces["material"], missing)
+    result = dr.select(found, old, color), dr.select(found, RECALLED, energy)
     dr.eval(result)
     return result
 
@@ -170,9 +170,9 @@ class GlossyProbeReprojection(OnLightmap):
         size = [dr.opaque(mi.Int32, side) for side in fine]
         unit = dr.opaque(mi.Float, float(knobs["unit"]))
         with stages.stage("g-buffer"):
-            preliminary, seen, surfaces = self.kernels["g-buffer"](camera, *fine)
+            preliminary, base, surfaces = self.kernels["g-buffer"](camera, *fine)
             surfaces |= self.kernels["curvature"](camera, preliminary, *fine)
-            base = averaged(seen, fine, grid)
+            base = averaged(base, fine, grid)
         with stages.stage("ray casting"):
             mirrored = self.kernels["mirror"](camera, preliminary, surfaces["glossy"], *fine)
         with stages.stage("gather"):

@@ -22,7 +22,7 @@ from gibench.rendering import surface
 def _gbuffer(scene, lightmap, camera, width: int, height: int):
     """What was hit, what it sends out but for glossy light, and what the gather must know of it."""
     hits = hits_of_rays(scene, ray_generator(camera), (width, height))
-    seen = hits.emission + lightmap.diffuse(hits.si, hits.preliminary, hits.active)
+    base = hits.emission + lightmap.diffuse(hits.si, hits.preliminary, hits.active)
     glossy = hits.glossy
     surfaces = {
         "glossy": glossy,
@@ -32,8 +32,8 @@ def _gbuffer(scene, lightmap, camera, width: int, height: int):
         "roughness": surface.roughness(scene, hits.bsdf, hits.si, glossy),
         "cosine": dr.abs(hits.si.wi.z),
     }
-    dr.eval(hits.preliminary, seen, surfaces)
-    return hits.preliminary, seen, surfaces
+    dr.eval(hits.preliminary, base, surfaces)
+    return hits.preliminary, base, surfaces
 
 
 def _mirrored(scene, lightmap, camera, preliminary, glossy, width: int, height: int):
@@ -80,8 +80,8 @@ class ImageSpaceGathering(OnLightmap):
         grid, fine = self.grid, self.fine(view)
         camera = camera_arrays(view.camera, fine)
         with stages.stage("g-buffer"):
-            preliminary, seen, surfaces = self.kernels["g-buffer"](camera, *fine)
-            base = averaged(seen, fine, grid)
+            preliminary, base, surfaces = self.kernels["g-buffer"](camera, *fine)
+            base = averaged(base, fine, grid)
         with stages.stage("ray casting"):
             radiance, blur = self.kernels["mirror"](camera, preliminary, surfaces["glossy"], *fine)
         with stages.stage("gather"):

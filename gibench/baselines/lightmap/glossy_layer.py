@@ -21,14 +21,14 @@ from gibench.rendering.denoise import denoise
 def _gbuffer(scene, lightmap, camera, width: int, height: int, denoised: bool):
     """What was hit, what it sends out but for glossy light, and what guides the denoiser."""
     hits = hits_of_rays(scene, ray_generator(camera), (width, height))
-    seen = hits.emission + lightmap.diffuse(hits.si, hits.preliminary, hits.active)
+    base = hits.emission + lightmap.diffuse(hits.si, hits.preliminary, hits.active)
     guides = {}
     if denoised:
         # The albedo of the layer that is denoised: the texture of a coated wood is not in its reflections.
         tint = surface.specular_albedo(scene, hits.bsdf, hits.si, hits.active)
         guides = {"albedo": mi.Color3f(dr.clip(tint, 0, 1)), "normal": mi.Color3f(hits.normal)}
-    dr.eval(hits.preliminary, seen, guides)
-    return hits.preliminary, seen, guides
+    dr.eval(hits.preliminary, base, guides)
+    return hits.preliminary, base, guides
 
 
 class GlossyLayer(OnLightmap):
@@ -49,8 +49,8 @@ class GlossyLayer(OnLightmap):
         grid, fine, denoised = self.grid, self.fine(view), bool(self.settings["denoise"])
         camera = camera_arrays(view.camera, fine)
         with stages.stage("g-buffer"):
-            preliminary, seen, guides = self.kernels["g-buffer"](camera, *fine, denoised)
-            base = averaged(seen, fine, grid)
+            preliminary, base, guides = self.kernels["g-buffer"](camera, *fine, denoised)
+            base = averaged(base, fine, grid)
             images = {name: np.asarray(averaged(values, fine, grid)) for name, values in guides.items()}
         with stages.stage(self.stage):
             color, extra = self.glossy(view, camera, preliminary)

@@ -23,10 +23,10 @@ def _scatter(scene, layers, sampler, si, bsdf, active):
     value, value_pdf, bounce, weight = eval_pdf_sample_specular(
         layers, bsdf, si, si.to_local(light.d), sampler.next_1d(), sampler.next_2d(), active
     )
-    share = dr.select(light.delta, 1, mis_weight(light.pdf, value_pdf))
-    seen = dr.select(lit, value * radiance * share, 0)
+    mis = dr.select(light.delta, 1, mis_weight(light.pdf, value_pdf))
+    direct = dr.select(lit, value * radiance * mis, 0)
     delta = mi.has_flag(bounce.sampled_type, mi.BSDFFlags.Delta)
-    return seen, si.spawn_ray(si.to_world(bounce.wo)), weight, bounce.pdf, delta
+    return direct, si.spawn_ray(si.to_world(bounce.wo)), weight, bounce.pdf, delta
 
 
 @dr.syntax
@@ -43,8 +43,8 @@ def glossy_radiance(scene, layers, lightmap: Lightmap, sampler, si, bsdf, active
     done = mi.UInt32(0)
 
     while glossy & (done < samples):
-        seen, ray, throughput, pdf, delta = _scatter(scene, layers, sampler, si, bsdf, glossy)
-        total += dr.select(dr.all(dr.isfinite(seen)), seen, 0)
+        direct, ray, throughput, pdf, delta = _scatter(scene, layers, sampler, si, bsdf, glossy)
+        total += dr.select(dr.all(dr.isfinite(direct)), direct, 0)
         reference = mi.Interaction3f(si)
         bounce = mi.UInt32(1)
         alive = glossy & (dr.max(throughput) > 0)
@@ -60,8 +60,8 @@ def glossy_radiance(scene, layers, lightmap: Lightmap, sampler, si, bsdf, active
 
             there = hit.bsdf(ray)
             alive &= hit.is_valid() & (bounce < bounces) & ((there.flags() & flags.NOT_DIFFUSE) != 0)
-            seen, ray, weight, pdf, delta = _scatter(scene, layers, sampler, hit, there, alive)
-            gained += throughput * seen
+            direct, ray, weight, pdf, delta = _scatter(scene, layers, sampler, hit, there, alive)
+            gained += throughput * direct
             total += dr.select(dr.all(dr.isfinite(gained)), gained, 0)
             throughput *= weight
             reference = mi.Interaction3f(hit)

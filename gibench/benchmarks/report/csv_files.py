@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
-"""What a text begins with that spreadsheets compute."""
+"""Beginnings of texts that spreadsheets take for formulas."""
 
 _WHO = ["track", "scene", "method", "label", "knobs", "seed", "machine", "result"]
 _LOOK = ["training", "step", "seconds", "error"]
@@ -50,9 +50,7 @@ def _plain(table: pd.DataFrame) -> pd.DataFrame:
     for name in table.columns:
         if not is_numeric_dtype(table[name]):
             texts = table[name].astype("object")
-            formula = texts.map(
-                lambda text: isinstance(text, str) and text.startswith(("=", "+", "-", "@", "\t", "\r"))
-            )
+            formula = texts.map(lambda text: isinstance(text, str) and text.startswith(FORMULA))
             table[name] = texts.where(~formula, "'" + texts.astype(str))
     return table
 

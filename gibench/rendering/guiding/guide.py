@@ -23,14 +23,14 @@ class Distributions:
     """What is learned. Row 0 stands for all places of which nothing is known.
 
     rows: (places,) uint32, the row of each place of the grid. lights: (E, L) over the lights, and the portals as one
-    more. directions: (E, BINS), relative. share: (E,) of directions that the guide chooses, in [0, 1); the BSDF chooses
-    the others.
+    more. directions: (E, BINS), relative. fraction: (E,) of directions that the guide chooses, in [0, 1); the BSDF
+    chooses the others.
     """
 
     rows: NDArray[np.uint32]
     lights: NDArray[np.float64]
     directions: NDArray[np.float64]
-    share: NDArray[np.float64]
+    fraction: NDArray[np.float64]
 
 
 def lights_of(mi_scene: Any) -> list[Any]:
@@ -63,7 +63,7 @@ class Guide:
         self._lights = mi.UInt32(learned.lights.shape[1])
         self._portal_light = mi.UInt32(len(keys))
         self._rows = mi.UInt32(learned.rows)
-        self._share = mi.Float(learned.share)
+        self._fraction = mi.Float(learned.fraction)
         self._light_table = mi.UInt32(light_table.ravel())
         self._light_probability = mi.Float(light_probability.ravel())
         self._table = mi.UInt32(table.ravel())
@@ -78,26 +78,26 @@ class Guide:
         place, inside = self.grid.place(si.p, normal, shift)
         return dr.gather(mi.UInt32, self._rows, place, active & inside)
 
-    def share(self, row, bsdf, active):
+    def fraction(self, row, bsdf, active):
         """Probability that a bounce is the guide's: 0 for what is not diffuse, which knows better itself."""
         diffuse = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.DiffuseReflection)
-        return dr.gather(mi.Float, self._share, row, diffuse)
+        return dr.gather(mi.Float, self._fraction, row, diffuse)
 
     def density(self, row, direction, active):
         """Of the guide's directions, per steradian."""
         return dr.gather(mi.Float, self._density, row * BINS + bin_of(direction), active)
 
-    def mixed_density(self, row, share, direction, bsdf_pdf, active):
+    def mixed_density(self, row, fraction, direction, bsdf_pdf, active):
         """Density of the direction of a bounce, chosen by the BSDF or by the guide."""
-        return dr.lerp(bsdf_pdf, self.density(row, direction, active), share)
+        return dr.lerp(bsdf_pdf, self.density(row, direction, active), fraction)
 
-    def bounce(self, context, si, bsdf, row, share, sampled, weight, sampler, active):
+    def bounce(self, context, si, bsdf, row, fraction, sampled, weight, sampler, active):
         """The next direction: the BSDF's sample, or the guide's in its place (one-sample MIS, Veach 1997, 9.2.4).
 
         sampled, weight: of the BSDF. Returns the direction (world), the weight (BSDF value over density), the density,
         whether it is a delta lobe's, and the relative index of refraction.
         """
-        guided = active & (sampler.next_1d() < share)
+        guided = active & (sampler.next_1d() < fraction)
         item = pick(self._table, row, mi.UInt32(BINS), sampler.next_1d(), guided)
         direction = direction_in(item, sampler.next_2d())
         local = si.to_local(direction)
@@ -106,13 +106,13 @@ class Guide:
         direction = dr.select(guided, direction, si.to_world(sampled.wo))
         value = dr.select(guided, value, weight * sampled.pdf)
         pdf = dr.select(guided, pdf, sampled.pdf)
-        mixed = dr.lerp(pdf, self.density(row, direction, active), share)
+        mixed = dr.lerp(pdf, self.density(row, direction, active), fraction)
         mixed_weight = dr.select(mixed > 0, value * inverse(mixed), 0)
         # Where nothing guides, the sample stays what it was: the density of a near-mirror may overflow.
-        alone = (share == 0) | delta
+        alone = (fraction == 0) | delta
         return (
             direction,
-            dr.select(alone, weight / (1 - share), mixed_weight),
+            dr.select(alone, weight / (1 - fraction), mixed_weight),
             dr.select(alone, sampled.pdf, mixed),
             delta,
             dr.select(guided, 1, sampled.eta),

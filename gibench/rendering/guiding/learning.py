@@ -35,7 +35,7 @@ PASSES = (1, 2, 4)
 DEPTH = 8
 """Scattering events of the paths."""
 
-SHARE = 0.4
+GUIDE_FRACTION = 0.4
 """Of the directions at a diffuse surface that the guide chooses; the other ones bound what it can spoil."""
 
 SPREAD = 0.5
@@ -146,9 +146,9 @@ class _Sums:
     def __init__(self, shape: tuple[int, ...], place: NDArray[np.uint32], lights: int) -> None:
         """shape: of the grid. place: of the samples of the first pass."""
         x, y, z = shape
-        seen = np.bincount(place, minlength=x * y * z * FACES)
-        places = np.flatnonzero(seen >= FEWEST)
-        self.rows = np.zeros(len(seen), dtype=np.uint32)
+        visits = np.bincount(place, minlength=x * y * z * FACES)
+        places = np.flatnonzero(visits >= FEWEST)
+        self.rows = np.zeros(len(visits), dtype=np.uint32)
         self.rows[places] = np.arange(len(places)) + 1
         self._near = _neighbours(self.rows.reshape(z, y, x, FACES), places)
         count = len(places) + 1
@@ -189,7 +189,7 @@ class _Sums:
             self.rows,
             (1 - LIGHT_FLOOR) * lights + LIGHT_FLOOR * plain,
             (1 - FLOOR) * directions + FLOOR * even,
-            np.where(known, SHARE * self.bounces / (self.bounces + DOUBT), 0.0),
+            np.where(known, GUIDE_FRACTION * self.bounces / (self.bounces + DOUBT), 0.0),
         )
 
 
@@ -239,12 +239,12 @@ def learn(scene: Any) -> Guide | None:
     points = _starts(scene)
     if not len(points):
         return None
-    portals = scene.portals if scene.portals is not None and float(scene.portals.share[0]) > 0 else None
+    portals = scene.portals if scene.portals is not None and float(scene.portals.fraction[0]) > 0 else None
     count = len(lights_of(scene.mi_scene))
     plain = np.full(count, 1 / count)
     if portals is not None:
-        share = float(portals.share[0])
-        plain = np.append((1 - share) * plain, share)
+        fraction = float(portals.fraction[0])
+        plain = np.append((1 - fraction) * plain, fraction)
     grid = Grid(points.min(axis=0) - MARGIN, points.max(axis=0) + MARGIN)
     nothing = Distributions(np.zeros(grid.places, np.uint32), plain[None], np.ones((1, BINS)), np.zeros(1))
     guide = Guide(scene.mi_scene, portals, grid, nothing)

@@ -92,8 +92,8 @@ def test_batches_can_begin_within_an_epoch(monkeypatch, lpips):
     for first in range(1, 9):
         for found, expected in zip(islice(learner.batches(first), 4), whole[first:], strict=False):
             assert [id(one) for one in found.examples] == [id(one) for one in expected.examples]
-            assert (found.windows, found.seen) == (expected.windows, expected.seen)
-    assert [one.seen is not None for one in whole] == [lpips and step % 4 == 0 for step in range(12)]
+            assert (found.windows, found.perceptual) == (expected.windows, expected.perceptual)
+    assert [one.perceptual is not None for one in whole] == [lpips and step % 4 == 0 for step in range(12)]
 
 
 def test_a_damaged_checkpoint_is_named(tmp_path):

@@ -1,1 +1,1 @@
-"""What networks are trained for: pixels, features of other networks, and judges that learn along."""
+"""Losses of networks: of pixels, of features of other networks, and of discriminators that learn along."""

@@ -1,4 +1,4 @@
-"""A judge that learns to tell made images from true ones, patch by patch (Isola et al. 2017, PatchGAN)."""
+"""A discriminator of made and true images, patch by patch (Isola et al. 2017, PatchGAN)."""
 
 from __future__ import annotations
 
@@ -44,14 +44,14 @@ class PatchGan(nn.Module):
         height, width = image.shape[-2:]
         if min(height, width) < SMALLEST:
             raise TrainingError(
-                f"a PatchGAN judges {SMALLEST} pixels along each side at least, not {width} × {height}"
+                f"a PatchGAN takes {SMALLEST} pixels along each side at least, not {width} × {height}"
             )
         logits: Tensor = self.layers(torch.cat([condition, image], dim=1))
         return logits
 
 
 def judging(of_true: Tensor, of_made: Tensor) -> Tensor:
-    """What the judge is trained for: mean cross entropy of its logits (Goodfellow et al. 2014); ln 2 is no idea."""
+    """Mean cross entropy of the discriminator's logits (Goodfellow et al. 2014); ln 2 where it cannot tell."""
     return 0.5 * (softplus(-of_true).mean() + softplus(of_made).mean())
 
 

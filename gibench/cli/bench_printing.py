@@ -23,14 +23,14 @@ from gibench.errors import GibenchError
 LABEL = 26
 
 
-class Teller:
+class RunPrinter:
     """Says what a run does, a line a result."""
 
     def __init__(self) -> None:
         """Nothing was said yet."""
         self._said = time.monotonic()
 
-    def tell(self, state: State) -> None:
+    def show(self, state: State) -> None:
         """Say what is new."""
         record = state.record
         if record is not None:
@@ -59,7 +59,7 @@ def _outcome(record: dict[str, Any]) -> str:
     return f"{1000 * seconds[len(seconds) // 2]:8.1f} ms"
 
 
-def tell_run(root: Path, report: Report) -> None:
+def print_run(root: Path, report: Report) -> None:
     """Say what a run came to, and what its time went to."""
     seconds = report.seconds
     _row("results", f"{root} ({len(report.ids)}, of which {report.made} new, {len(report.failed)} failed)")
@@ -77,7 +77,7 @@ def remark(text: str) -> None:
     say(text, err=True)
 
 
-def tell_scored(scored: Scored) -> None:
+def print_scored(scored: Scored) -> None:
     """Say which metrics could not be computed, and why."""
     for name, (why, count) in scored.skipped.items():
         _row("left out", f"{name} of {count} results: {why}")
@@ -85,7 +85,7 @@ def tell_scored(scored: Scored) -> None:
         say(problem, err=True)
 
 
-def tell_equal_time(root: Path, milliseconds: float) -> None:
+def print_equal_time(root: Path, milliseconds: float) -> None:
     """Say which settings meet a time per frame."""
     run = load(root).run
     for entry in run["equal_time"]:
@@ -98,7 +98,7 @@ def tell_equal_time(root: Path, milliseconds: float) -> None:
             _row(f"≤ {milliseconds:g} ms", f"{met} (measured {tried.strip()})")
 
 
-def tell_board(root: Path) -> None:
+def print_board(root: Path) -> None:
     """Print the leaderboard of a run by its first metric."""
     results = load(root)
     if results.frames.empty:
@@ -123,7 +123,7 @@ def tell_board(root: Path) -> None:
         say(f"{'(noise of the references)':<{LABEL}} {noise:9.4f}")
 
 
-def tell_results(root: Path) -> None:
+def print_results(root: Path) -> None:
     """List the results of a run, failed ones with their reasons."""
     results = load(root)
     table = results.results
@@ -134,13 +134,13 @@ def tell_results(root: Path) -> None:
     say(f"{len(table)} results, {failed} failed; tracebacks stand in {results.folder.results}")
 
 
-def show_track(name: str) -> None:
+def print_track(name: str) -> None:
     """Print the file of a track that ships with gibench."""
     load_track(name)
     say((resources.files("gibench.benchmarks") / "tracks" / f"{name}.toml").read_text("utf-8"), nl=False)
 
 
-def tell_tracks(only: str | None) -> None:
+def print_tracks(only: str | None) -> None:
     """List tracks and their presets."""
     for name in track_names() if only is None else (only,):
         track = load_track(name)
@@ -164,7 +164,7 @@ def _size(preset: Preset) -> str:
     return f"{text}, up to {views} training views"
 
 
-def tell_methods(track: str | None) -> None:
+def print_methods(track: str | None) -> None:
     """List methods and their knobs; what is broken on stderr."""
     registry = installed()
     for id, claims in sorted(registry.methods.items()):
@@ -185,7 +185,7 @@ def tell_methods(track: str | None) -> None:
         say(f"error: {broken}", err=True)
 
 
-def tell_methods_compared(results: Results, first: str, second: str) -> None:
+def print_methods_compared(results: Results, first: str, second: str) -> None:
     """Print the paired comparison of two methods of a run, a row a metric and part."""
     one, other = _one_label(results, first), _one_label(results, second)
     _row("first", one)
@@ -197,7 +197,7 @@ def tell_methods_compared(results: Results, first: str, second: str) -> None:
             _compared(f"{name} {part}", results, one, results, other, name, part)
 
 
-def tell_runs_compared(first: Results, second: Results, name: str, part: str) -> None:
+def print_runs_compared(first: Results, second: Results, name: str, part: str) -> None:
     """Print the paired comparison of what two runs have in common, a row a label."""
     both = [label for label in dict.fromkeys(first.results["label"]) if label in set(second.results["label"])]
     if not both:
