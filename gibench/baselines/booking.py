@@ -1,4 +1,4 @@
-"""Which things of a row were handed out, so that whoever took them is charged for them."""
+"""Books which items of a sequence were handed out, so that whoever took them is charged for them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a frame's camera rays hit, as Dr.Jit arrays that stay on the device: where every deferred method begins."""
+"""First hits of a frame's camera rays, as Dr.Jit arrays that stay on the device: where every deferred method begins."""
 
 # mypy: disable-error-code="no-untyped-def, misc"
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a method is to the benchmark: a card that says what it needs, and two stages that do the work.
+"""The interface of methods: a card with its needs, and the stages that do the work.
 
 The card is light: listing methods imports neither torch nor Mitsuba, which come with the implementation. A package
 offers its cards through the entry-point group `gibench.methods`; `docs/adding-a-method.md` walks through one.
@@ -152,7 +152,7 @@ class Method:
 
 @dataclass(frozen=True)
 class Training:
-    """What a method may train on: once a track on many rooms, or once a scene on that scene's views.
+    """Training data of a method: once a track on many rooms, or once a scene on that scene's views.
 
     views: frames to learn from, of one room or of many. seconds: after which a training ends by itself, with the best
     weights so far; None for no end but its own. seed: all that it may draw random numbers from. folder: where weights
@@ -170,7 +170,7 @@ class Training:
 
 @dataclass(frozen=True)
 class Site:
-    """What a method may prepare from.
+    """Inputs of a method's preparation.
 
     scene: loaded under the run's variant. folder: with scene.xml and what it needs, but without any frame. resolution:
     (width, height) of the frames to come. training: views of the room that are not scored; whoever is handed one is
@@ -217,7 +217,7 @@ class View:
 
 
 class Prediction:
-    """What a method says a frame looks like: images (H, W, 3), finite, ≥ 0, in the units of the channels.
+    """The images that a method gives for a frame: arrays (H, W, 3), finite, ≥ 0, in the units of the channels.
 
     An image is whatever array the method computes with: of NumPy, a tensor of torch, a mi.TensorXf, on any device.
     It is handed over as it is; the attributes copy it to the host when they are first read, which the benchmark does

@@ -30,7 +30,7 @@ def digest(*modules: str) -> str:
 
 
 def module_of(function: Callable[..., Any]) -> str:
-    """Where a function, a method, a class or a partial of one is written."""
+    """Module in which a function, a method, a class or a partial of one is written."""
     while isinstance(function, partial):
         function = function.func
     return function.__module__ or ""
@@ -94,7 +94,7 @@ def _file(name: str) -> Path | None:
 
 @cache
 def _read(name: str, file: Path) -> tuple[tuple[str, ...], str]:
-    """What a module imports, dotted names that may be modules, and its syntax tree without docstrings, as text."""
+    """Imports of a module, dotted names that may be modules, and its syntax tree without docstrings, as text."""
     tree = ast.parse(file.read_bytes())
     package = name.split(".") if file.name == "__init__.py" else name.split(".")[:-1]
     names: set[str] = set()

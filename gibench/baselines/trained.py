@@ -14,7 +14,7 @@ from gibench.baselines.stages import Stages
 from gibench.baselines.training_set import TrainingSet
 
 CURVE = "training.json"
-"""What a training says of itself beside its weights: an object with `curve`, a list of looks at what is held out, each
+"""Record of a training beside its weights: an object with `curve`, a list of looks at what is held out, each
 with `step`, `seconds` and `error`. `gibench.baselines.training.Trained.record` makes one."""
 
 

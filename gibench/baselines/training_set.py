@@ -1,4 +1,4 @@
-"""What methods learn from: frames of one room or of many, made from the table of a dataset.
+"""Training sets: frames of one room or of many, made from the table of a dataset.
 
 Nothing but the table is read until a frame is handed out. Whoever is handed one is charged with its rendering, whatever
 process reads it.
@@ -39,7 +39,7 @@ class TrainingSet(Sequence[Frame]):
         self._booking = Booking(len(self))
 
     def __repr__(self) -> str:
-        """How much there is."""
+        """Number of frames and rooms."""
         return f"TrainingSet({len(self)} frames of {len(self.rooms)} rooms)"
 
     def __len__(self) -> int:
@@ -91,7 +91,7 @@ class TrainingSet(Sequence[Frame]):
 
     @cached_property
     def sha256(self) -> str:
-        """What tells these frames from others, hexadecimal: shots and content, no pixel of which is read."""
+        """Hash of these frames, hexadecimal, of shots and content; no pixel is read."""
         content = hashlib.sha256()
         if self._dataset is not None:
             table = self.frames.drop(columns=[name for name in OF_THE_MAKING if name in self.frames])

@@ -1,4 +1,4 @@
-"""Which code made a result: versions, and a digest of the sources that a method's implementation imports.
+"""Version of the code that made a result: versions, and a digest of the sources that a method's implementation imports.
 
 A method that is edited makes new results, without its version having to change; the results of all others stay.
 """

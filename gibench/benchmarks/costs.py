@@ -1,4 +1,4 @@
-"""What a preparation cost, by what it was spent on."""
+"""Cost of preparations, by the kind of work."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def preparation(
     made: list[Bake],
     views: Sequence[TrainingSet],
 ) -> dict[str, Any]:
-    """What a preparation cost, whoever paid for it first.
+    """Cost of a preparation, whoever paid for it first.
 
     wall: seconds of `prepare`. stages: seconds by stage in it. used: bakes that it read, made: those of them that were
     not there before. A bake that was there counts with what making it took; so do the views that were handed out.

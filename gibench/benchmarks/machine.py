@@ -1,4 +1,4 @@
-"""What results are made on: hardware, threads, variant, versions. Times compare only where all of it agrees."""
+"""The machine of results: hardware, threads, variant, versions. Times compare only where all of it agrees."""
 
 from __future__ import annotations
 
@@ -81,6 +81,6 @@ def _facts(variant: str, threads: int) -> dict[str, Any]:
 
 
 def digest(facts: Mapping[str, Any]) -> str:
-    """What tells machines apart: 12 hexadecimal digits of the facts that times depend on."""
+    """Digest of a machine: 12 hexadecimal digits of the facts that times depend on."""
     compared = {name: facts[name] for name in COMPARED}
     return hashlib.sha256(json.dumps(compared, sort_keys=True).encode()).hexdigest()[:12]

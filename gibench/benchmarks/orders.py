@@ -1,4 +1,4 @@
-"""What a command asks for: a track, a size of it, methods with their settings."""
+"""Orders of a command: a track, a size of it, methods with their settings."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from gibench.rendering.channels import resolve
 
 @dataclass(frozen=True)
 class Order:
-    """What a command asks for.
+    """Order of a command.
 
     methods: with their settings, in the order in which they run. rooms, seeds: None takes the preset's. scenes: keys
     of a recipe that put scene files in the place of rooms. command: how to do the same again, for the record and for
@@ -41,7 +41,7 @@ class Order:
 
     @property
     def room_count(self) -> int:
-        """How many rooms or scenes."""
+        """Number of rooms or scenes."""
         return len(self.scenes.get("scenes", ())) or self.rooms or self.size.rooms
 
 

@@ -1,4 +1,4 @@
-"""What is known of a result, as its JSON file says it."""
+"""Records of results, as their JSON files hold them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the files of a run must hold before anything is made of them; see `gibench.datasets.checked`."""
+"""Schemas of the files of a run, checked before anything is made of them; see `gibench.datasets.checked`."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def _metric_or_side(name: str) -> str:
 
 
 Part = Annotated[str, AfterValidator(_part)]
-"""What is scored of an image: "full", "specular" …"""
+"""Part of an image that is scored: "full", "specular" …"""
 
 Metric = Annotated[str, AfterValidator(_metric)]
 """A metric that there is: it becomes part of a file's name, and is looked up."""
@@ -43,7 +43,7 @@ MetricOrSide = Annotated[str, AfterValidator(_metric_or_side)]
 
 
 class Machine(Checked):
-    """What times depend on. Whatever else is said of a machine is for people."""
+    """Facts of a machine that times depend on. All others are for people."""
 
     cpu: str
     cores: Count | None
@@ -60,7 +60,7 @@ class ThisMachine(Machine):
 
 
 class EqualTime(Checked):
-    """What a search for a setting of a given time found."""
+    """Result of a search for a setting of a given time."""
 
     ms: Amount
     method: Name
@@ -90,7 +90,7 @@ class Run(Checked):
 
 
 class Config(Checked):
-    """What a result is keyed by."""
+    """Configuration that a result is keyed by."""
 
     track: Name
     scene: Name
@@ -103,7 +103,7 @@ class Config(Checked):
 
 
 class FrameTime(Checked):
-    """What a frame took, in seconds."""
+    """Times of a frame, in seconds."""
 
     seconds: Amount
     stages: Annotated[dict[str, Amount], Field(max_length=100)]
@@ -127,7 +127,7 @@ class Bake(Checked):
 
 
 class Prepare(Checked):
-    """What a preparation took, in seconds and bytes."""
+    """Cost of a preparation, in seconds and bytes."""
 
     seconds: Amount
     bytes: Count

@@ -38,7 +38,7 @@ class Broken:
 
 @dataclass(frozen=True)
 class Registry:
-    """What the installed packages offer.
+    """Methods of the installed packages.
 
     methods: id → every claim of that id, one where all is well. broken: entry points that could not be used; they
     keep nothing else from working.

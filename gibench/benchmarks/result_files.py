@@ -90,7 +90,7 @@ class RunFolder:
         return self.root / "scenes" / "sites" / scene
 
     def result_file(self, id: str) -> Path:
-        """What is known of a result."""
+        """Record of a result."""
         return self.results / f"{id}.json"
 
     def predictions(self, id: str) -> Path:
@@ -98,7 +98,7 @@ class RunFolder:
         return self.results / id
 
     def partial(self, id: str) -> Path:
-        """Where its frames are gathered until all are there."""
+        """Folder in which its frames are gathered until all are there."""
         return self.results / f".{id}.partial"
 
     def score_file(self, name: str) -> Path:

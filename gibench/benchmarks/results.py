@@ -178,7 +178,7 @@ class Results:
 
     @cached_property
     def floor(self) -> pd.DataFrame:
-        """What the reference's own noise costs: scene, frame, metric, part, value.
+        """Noise floors of the references: scene, frame, metric, part, value.
 
         Temporal metrics stand under frame −1 (`WHOLE_PATH`) for the first sequence of a scene, −2 for the second, and
         so on.
@@ -206,7 +206,7 @@ class Results:
         return {name: why for scores in self._scores.values() for name, why in scores["skipped"].items()}
 
     def prediction(self, result: str, frame: int, part: str = "full") -> Image:
-        """What a result says a frame looks like, (H, W, 3) linear. Raises ResultsError."""
+        """Predicted image of a frame, (H, W, 3) linear. Raises ResultsError."""
         files = self._records[result]["files"]
         parts = predictions.read(self.root, result, frame, files[f"{frame:04d}.exr"])
         if part not in parts:

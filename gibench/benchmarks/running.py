@@ -34,7 +34,7 @@ SPENT = ("scenes", "prepare", "render", "score")
 
 @dataclass
 class State:
-    """How far a run is, for whoever watches.
+    """Progress of a run, for whoever watches.
 
     panoramas: how many of the rooms that light views are there, and of how many. record: of the result that has just
     been written. training: what a training on rooms that has just ended took.
@@ -51,7 +51,7 @@ class State:
 
 @dataclass(frozen=True)
 class Report:
-    """What a run came to. ids: of all results that were asked for. made, failed: how many now.
+    """Result of a run. ids: of all results that were asked for. made, failed: how many now.
 
     seconds: of all of it, by what they were spent on; "harness" is what is neither scenes, preparing, rendering nor
     scoring.
@@ -101,7 +101,7 @@ class Run:
             refuse_files_outside(self.folder.dataset("reference"), scene)
 
     def _identity(self) -> dict[str, Any]:
-        """What all results of a folder have in common. Rooms may be added."""
+        """Identity that all results of a folder share. Rooms may be added."""
         size, scenes = self.order.size, self.order.scenes
         return {
             "track": self.order.track.id,
@@ -462,7 +462,7 @@ def _why(root: Path, problem: OSError) -> str:
 
 
 def failures(root: Path) -> list[tuple[str, str]]:
-    """What failed in a folder: (label, reason)."""
+    """Failed results of a folder: (label, reason)."""
     folder = RunFolder(root)
     records = (folder.read_result(id) for id in folder.ids())
     return [

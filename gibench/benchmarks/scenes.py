@@ -121,7 +121,7 @@ def indoor_or_outdoor(environment: str) -> tuple[str, ...]:
 
 
 def scene_name(room: int) -> str:
-    """What tables call a room."""
+    """Name of a room in tables."""
     return f"room-{room:06d}"
 
 

@@ -41,7 +41,7 @@ Frames = Callable[[int], dict[str, Image]]  # frame → part → image
 
 @dataclass(frozen=True)
 class Scored:
-    """What scoring came to. done: score files that were written or completed. skipped: metric → why, each with how
+    """Result of scoring. done: score files that were written or completed. skipped: metric → why, each with how
     many results it concerns. problems: results that cannot be read, one line each."""
 
     done: int
@@ -291,7 +291,7 @@ def exposures_of(folder: RunFolder, scene: SceneFiles) -> tuple[float, ...]:
 
 
 def reference_parts(scene: SceneFiles, frame: int) -> dict[str, Image]:
-    """What predictions are scored against, (H, W, 3) by part: those whose channels are stored."""
+    """References of predictions, (H, W, 3) by part: those whose channels are stored."""
     first, second = (half_parts(scene, which, frame) for which in (0, 1))
     return {part: 0.5 * (image + second[part]) for part, image in first.items()}
 

@@ -1,4 +1,4 @@
-"""Which settings of a method are run, and what the board calls them."""
+"""Settings of a method that are run, and their labels on the board."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def choices(method: Method, plan: MethodPlan, overrides: Mapping[str, tuple[Sett
 
 
 def base_settings(method: Method, plan: MethodPlan) -> dict[str, Setting]:
-    """What labels leave out: the plan's base, with the first value of what it varies. Raises MethodError."""
+    """Settings that labels leave out: the plan's base, with the first value of what it varies. Raises MethodError."""
     return method.settings({**plan.base, **{knob: values[0] for knob, values in plan.vary.items()}})
 
 

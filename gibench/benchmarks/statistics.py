@@ -64,7 +64,7 @@ def _numbered(sequences: pd.DataFrame) -> pd.DataFrame:
 
 
 def floor(results: Results, name: str, part: str) -> float:
-    """What the noise of the references costs a perfect method, as a distance from the perfect value.
+    """Noise floor: error of a perfect method against noisy references, as a distance from the perfect value.
 
     The mean over scenes of their frames' means. NaN where it is not known: for the specular part, and for metrics whose
     perfect value is none or infinite.
@@ -151,7 +151,7 @@ def difference(first: tuple[Results, str], second: tuple[Results, str], name: st
 
 
 def verdict(interval: Interval, noise: float, direction: str) -> Verdict:
-    """What may be said of a difference. noise: see `Difference.floor`; NaN leaves it out."""
+    """Verdict on a difference. noise: see `Difference.floor`; NaN leaves it out."""
     if not interval.excludes_zero:
         return "unsure"
     if abs(interval.mean) < noise:

@@ -40,7 +40,7 @@ class _Strict(BaseModel):
 
 
 class Budget(_Strict):
-    """What a result may take before it counts as failed, seconds.
+    """Time limits after which a result counts as failed, seconds.
 
     prepare: of a preparation, or of a training on rooms. render: of all frames of one setting, warm-up included.
     training: after which a training ends by itself, with the best weights so far; it has not failed then.
@@ -99,7 +99,7 @@ class Preset(_Strict):
     methods: dict[str, MethodPlan] = {}
 
     def plan(self, method: Method) -> MethodPlan:
-        """What this preset runs of a method."""
+        """Plan of this preset for a method."""
         plan = self.methods.get(method.id, MethodPlan())
         shared = {knob.name: self.knobs[knob.name] for knob in method.knobs if knob.name in self.knobs}
         return MethodPlan(base={**shared, **plan.base}, vary=plan.vary)

@@ -61,7 +61,7 @@ FULL = 16 * 2**20
 
 @dataclass(frozen=True)
 class Task:
-    """What one process does.
+    """Task of one process.
 
     scene: None for the process that trains on rooms. settings: (knobs, folder for the frames) of every result, all with
     the same baked settings. training: root of the dataset of training views, None where the method reads none. rooms:
@@ -166,7 +166,7 @@ class _Session:
 
 
 def on_rooms(task: Task) -> tuple[TrainingSet, BakeCache]:
-    """What a method trains on, and where its weights are kept, on a track that trains on rooms."""
+    """Training data of a method and the folder of its weights, on a track that trains on rooms."""
     assert task.rooms is not None
     views = training_set(task.training)
     return views, BakeCache(task.rooms, "rooms", task.machine, views)

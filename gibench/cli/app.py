@@ -1,4 +1,4 @@
-"""Which commands there are. Nothing heavy is imported before a command runs, so that `--help` is quick."""
+"""The commands. Nothing heavy is imported before a command runs, so that `--help` is quick."""
 
 from __future__ import annotations
 

@@ -115,7 +115,7 @@ def run_track(
 
     def score_and_count(doing: Run) -> None:
         with counting("results scored") as on_progress:
-            scored.append(score(doing.folder, on_progress=on_progress, told=telling.remark))
+            scored.append(score(doing.folder, on_progress=on_progress, told=printing.remark))
 
     report = run(
         root,
@@ -179,7 +179,7 @@ def score_results(
     folder.read_run()
     more = () if metrics is None else names_in(metrics, "--metrics")
     with folder.claimed(), counting("results scored") as on_progress:
-        scored = score(folder, more=more, on_progress=on_progress, told=telling.remark)
+        scored = score(folder, more=more, on_progress=on_progress, told=printing.remark)
     say(f"{scored.done} files of scores written in {folder.scores}")
     printing.print_scored(scored)
     if scored.problems:

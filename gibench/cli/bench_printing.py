@@ -1,4 +1,4 @@
-"""What the commands of `gibench bench` say, in 80 columns."""
+"""Output of the commands of `gibench bench`, in 80 columns."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `gibench bench report` does: a report into a folder, into one file, or out of one."""
+"""The work of `gibench bench report`: a report into a folder, into one file, or out of one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `make-dataset` and `gibench dataset info` say."""
+"""Output of `make-dataset` and `gibench dataset info`."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def dry_run(recipe: Recipe, variant: str, workers: int) -> None:
 
 
 def _gloss(root: Path) -> str:
-    """What the cameras of the rooms see of it."""
+    """Its fraction of the views of the rooms."""
     seen = []
     for room in whole_rooms(root):
         path = room_folder(root, room) / "room.json"

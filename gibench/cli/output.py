@@ -1,4 +1,4 @@
-"""What the commands print: text that may stem from anybody's files, and must not steer the terminal."""
+"""Output of the commands: text that may stem from anybody's files, and must not steer the terminal."""
 
 from __future__ import annotations
 

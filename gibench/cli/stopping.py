@@ -1,4 +1,4 @@
-"""How a command is stopped: SIGTERM and SIGHUP end it as tidily as Ctrl-C does.
+"""Signals that stop a command: SIGTERM and SIGHUP end it as tidily as Ctrl-C does.
 
 Containers, batch systems and service managers send SIGTERM, a terminal that is closed sends SIGHUP.
 """

@@ -1,4 +1,4 @@
-"""How a channel looks on a screen: every kind of quantity has its own way to colour."""
+"""Channels as pictures for screens: every kind of quantity has its own way to colour."""
 
 from __future__ import annotations
 

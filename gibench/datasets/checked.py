@@ -22,7 +22,7 @@ REPEATED = 80
 
 
 class Checked(BaseModel):
-    """What a file must hold. Types are taken literally: "5" is no number, 1 is no truth value."""
+    """Base of the schemas of files. Types are taken literally: "5" is no number, 1 is no truth value."""
 
     model_config = ConfigDict(extra="allow", strict=True, frozen=True, allow_inf_nan=False)
 

@@ -1,4 +1,4 @@
-"""What a dataset would take: every room built and checked, one frame measured, nothing kept."""
+"""Cost of a dataset: every room built and checked, one frame measured, nothing kept."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ MEASURED_WIDTH, MEASURED_SPP = 256, 64
 
 @dataclass
 class Estimate:
-    """What a dataset would take on this machine.
+    """Cost of a dataset on this machine.
 
     rooms, frames, rejected_rooms, rejections: counted, not estimated (frames: of the rooms that could be built;
     rejections: reason → count over rooms and views). build_seconds: per room, measured on all rooms.

@@ -1,4 +1,4 @@
-"""What an OpenEXR file says of itself, read before any library makes room for it.
+"""The header of an OpenEXR file, read before any library makes room for it.
 
 A header of 500 bytes may ask for any number of pixels. Only what frames are written as is read: one part of scan lines,
 compressed without loss by methods that hold at most `EXPANSION` bytes in one.
@@ -50,7 +50,7 @@ class Header:
 
     @property
     def bytes(self) -> int:
-        """What the pixels take when they are read."""
+        """Bytes of the pixels once they are read."""
         return self.width * self.height * sum(self.layers.values())
 
 

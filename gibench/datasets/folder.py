@@ -24,12 +24,12 @@ ENVIRONMENTS = "environments"
 
 
 def room_folder(root: Path, room: int) -> Path:
-    """Where a whole room lies."""
+    """Folder of a whole room."""
     return root / "rooms" / f"{room:06d}"
 
 
 def partial_folder(root: Path, room: int, owner: int) -> Path:
-    """Where process number `owner` builds a room until it is whole."""
+    """Folder in which process number `owner` builds a room until it is whole."""
     return root / "rooms" / f".{room:06d}.partial-{owner}"
 
 
@@ -62,7 +62,7 @@ def remove_partials(root: Path, room: int | None = None) -> None:
 
 
 def own_leftovers(folder: Path, pattern: str) -> list[Path]:
-    """What lies in a folder under names that match a pattern; nothing where the folder is a link."""
+    """Paths in a folder whose names match a pattern; none where the folder is a link."""
     if not gate.real_folder(folder):
         return []
     return [entry for entry in folder.iterdir() if re.fullmatch(pattern, entry.name)]

@@ -39,7 +39,7 @@ class Frame:
         self.row = row
 
     def __repr__(self) -> str:
-        """Which frame it is."""
+        """Room and number of the frame."""
         return f"Frame(room={self.room}, view={self.view}, path={str(self.path)!r})"
 
     @property
@@ -132,7 +132,7 @@ class Dataset:
         self.frames = frames
 
     def __repr__(self) -> str:
-        """Where it is and how much is in it."""
+        """Folder, rooms and frames."""
         return f"Dataset({str(self.root)!r}, {len(self)} frames of {self.frames['room'].nunique()} rooms)"
 
     def __len__(self) -> int:
@@ -195,7 +195,7 @@ class Dataset:
         return self._part(np.flatnonzero(self.frames["split"] == name))
 
     def room_folder(self, room: int) -> Path:
-        """Where a room's scene.xml, room.json and room.glb lie."""
+        """Folder of a room's scene.xml, room.json and room.glb."""
         return room_folder(self.root, room)
 
     def names(self, room: int) -> tuple[list[str], list[str]]:

@@ -25,7 +25,7 @@ from gibench.datasets.unfinished import unfinished_rooms
 
 @dataclass
 class Progress:
-    """How far a run is. rooms, frames: of the whole dataset; before: what was whole when the run began.
+    """Progress of a run. rooms, frames: of the whole dataset; before: what was whole when the run began.
 
     paths: camera paths traced by this run. kernel_seconds: time in the renderer, summed over workers.
     rejected_rooms: number → reason. remarks: what happened that the user should know of, a line each.
@@ -46,7 +46,7 @@ class Progress:
 
 @dataclass(frozen=True)
 class Summary:
-    """What there is after a run. totals: as in `dataset.json`. seconds: wall time of this run.
+    """Result of a run. totals: as in `dataset.json`. seconds: wall time of this run.
 
     made: rooms that this run made; 0 where the dataset was complete already. frames: that it rendered.
     """
@@ -241,7 +241,7 @@ class _Run:
                 self.finish(started, ended=False)
 
     def _record(self, started: float, *, ended: bool) -> dict[str, Any]:
-        """What this run has done so far; one that is killed leaves that it began, and did not end."""
+        """Record of this run so far; one that is killed leaves that it began, and did not end."""
         return {
             "command": self.command,
             "began": self.began.isoformat(timespec="seconds"),

@@ -51,7 +51,7 @@ Report = Callable[[str, Any], None]
 
 @dataclass(frozen=True)
 class Work:
-    """What a worker does. The functions are pickled by name.
+    """The task of a worker. The functions are pickled by name.
 
     setup: runs once in each worker; what it returns reaches `Listener.ready`. job: does one room; it may
     report on its way, and what it returns reaches `Listener.done`. place: a room as messages call it. again: what a
@@ -67,7 +67,7 @@ class Work:
 
 @dataclass(frozen=True)
 class Listener:
-    """What the process that hands out rooms wants to hear. An exception raised in here stops all workers."""
+    """Callbacks of the process that hands out rooms. An exception raised in here stops all workers."""
 
     ready: Callable[[Any], None]
     message: Callable[[int, str, Any], None]
@@ -170,8 +170,9 @@ class _Watch:
             limit = max(COMPUTING_PATIENCE, SILENCES * self.longest) if self.longest else float("inf")
             if not worker.busy or worker.connection.poll():
                 continue
-            if now - worker.last_message > limit:
-                worker.hung = f"said nothing for {now - worker.last_message:.0f} s, {SILENCES} times as long as ever before"
+            silence = now - worker.last_message
+            if silence > limit:
+                worker.hung = f"said nothing for {silence:.0f} s, {SILENCES} times as long as ever before"
             elif now - worker.last_computed > PATIENCE:
                 worker.hung = f"hangs: it has not computed anything for {now - worker.last_computed:.0f} s"
 

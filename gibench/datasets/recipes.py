@@ -325,7 +325,7 @@ class Recipe(BaseModel):
         return self.path_views + sum(sequence.views for sequence in self.sequences.values())
 
     def moves(self) -> dict[str, str]:
-        """What moves along a path, by the name that its frames bear."""
+        """Moving parts of a path, by the name that its frames bear."""
         moves: dict[str, str] = {plan.name: plan.moves for plan in self.plans()}
         return moves if self.path == "stills" else {**moves, self.path: self.path_moves}
 
@@ -434,7 +434,7 @@ class Recipe(BaseModel):
             raise RecipeError(str(problem)) from None
 
     def import_settings(self) -> ImportSettings:
-        """How the scene files are read."""
+        """Options for reading the scene files."""
         from gibench.generators.imported.scene import ImportSettings
 
         cameras = None if self.cameras is None else Path(self.cameras)
@@ -500,7 +500,7 @@ def load_recipe(path: Path, overrides: Mapping[str, Any] | None = None) -> Recip
 
 
 def toml_values(content: bytes) -> dict[str, Any]:
-    """What a TOML file holds. Raises ValueError, whose text fits on a line, for what is none."""
+    """Content of a TOML file. Raises ValueError, whose text fits on a line, for what is none."""
     try:
         # Editors of Windows write a byte order mark, which TOML does not know.
         return tomllib.loads(content.decode("utf-8-sig"))
@@ -587,5 +587,5 @@ def _message(
 
 
 def _place(key: str, source: str, options: frozenset[str]) -> str:
-    """What an error calls the place that a key's value came from."""
+    """Name in errors of the place that a key's value came from."""
     return OPTIONS.get(key, f"--{key}") if key in options else f"{source}: {key}"

@@ -1,4 +1,4 @@
-"""What the JSON files of a dataset must hold before anything is made of them; see `gibench.datasets.checked`."""
+"""Schemas of the JSON files of a dataset, checked before anything is made of them; see `gibench.datasets.checked`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ FileName = Annotated[str, Field(min_length=1, max_length=1000)]
 
 
 class Versions(Checked):
-    """What the pixels were made by; all other packages are named beside."""
+    """Packages that decide the pixels; all others are named beside."""
 
     gibench: str
     mitsuba: str
@@ -146,7 +146,7 @@ class Change(Checked):
 
 
 class Source(Checked):
-    """Where an imported scene came from."""
+    """Origin of an imported scene."""
 
     up: str
     scale: float
@@ -162,7 +162,7 @@ class Described(Checked):
 
 
 class Shine(Checked):
-    """What a generated room says of its gloss."""
+    """Gloss of a generated room."""
 
     gloss: Annotated[float, Field(ge=0, le=1)] = 0.0
 

@@ -86,7 +86,7 @@ def frame_seed(recipe: Recipe, room: int, view: int) -> int:
 
 
 def given_cameras(recipe: Recipe, room: int) -> int:
-    """How many cameras room number `room` brings along: 0 but for imported scenes. Raises `SceneFileError`."""
+    """Number of cameras that room number `room` brings along: 0 but for imported scenes. Raises `SceneFileError`."""
     if not recipe.scenes:
         return 0
     from gibench.generators.imported.scene import import_scene
@@ -397,7 +397,7 @@ class Stopwatch:
 
 
 def machine() -> dict[str, Any]:
-    """What the dataset is made on: operating system, processor, cores, memory (bytes), Python."""
+    """The machine that the dataset is made on: operating system, processor, cores, memory (bytes), Python."""
     import psutil
 
     return {

@@ -1,4 +1,4 @@
-"""Which rooms are for training, validation and testing."""
+"""Splits of rooms into training, validation and testing."""
 
 from __future__ import annotations
 

@@ -127,7 +127,7 @@ def _panorama_problems(root: Path, records: list[dict[str, Any]]) -> Iterator[Pr
 
 
 def _file_problem(root: Path, file: str, known: Mapping[str, Any]) -> str:
-    """What is wrong with a file of a room; empty where it is as it was written."""
+    """Problem of a file of a room; empty where it is as it was written."""
     try:
         with gate.opened(gate.inside(root, file)) as content:
             size = os.fstat(content.fileno()).st_size

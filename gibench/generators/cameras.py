@@ -1,4 +1,4 @@
-"""Where the camera stands: stills and walks through the free floor of a room.
+"""Camera placement: stills and walks through the free floor of a room.
 
 Every candidate stands where a person who came in through the door can stand, and is judged by rays before it
 is taken (see `view_checks`). What is refused is counted by reason.
@@ -63,7 +63,7 @@ class NoView(GibenchError):
 
 
 class Stage:
-    """What cameras need to know of a room.
+    """The facts of a room that cameras are placed by.
 
     free: polygon of the ground where a camera may stand. things: (N, 3) middles of what is worth looking at.
     shell_owners: see `view_checks.check_views`.

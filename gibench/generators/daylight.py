@@ -1,4 +1,4 @@
-"""What shines through the windows: nothing, a sun-and-sky model, or an HDR panorama, in W·m⁻²·sr⁻¹."""
+"""Daylight through the windows: nothing, a sun-and-sky model, or an HDR panorama, in W·m⁻²·sr⁻¹."""
 
 from __future__ import annotations
 
@@ -130,7 +130,7 @@ def sample_hdr(rng: np.random.Generator, **fixed: Any) -> Environment:
 def sample_daylight(
     rng: np.random.Generator, *, kind: str | None = None, path: str | None = None, **fixed: Any
 ) -> Environment:
-    """What lies outside the windows of a room.
+    """The environment outside the windows of a room.
 
     kind: "none", "sunsky", "hdr", or None to draw: nothing in 3 of 10 rooms, else the panorama at `path` if
     one is given, else sun and sky. fixed: parameters of `sunsky` or `hdr` that are not drawn. Raises

@@ -1,4 +1,4 @@
-"""What is fixed to the building: ceiling panels, downlights, the tiles above a worktop."""
+"""Fixtures of the building: ceiling panels, downlights, the tiles above a worktop."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How much of what the cameras of a room see is glossy."""
+"""Glossy fraction of the views of a room."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where in a room an area light can be: the free space, and whether a rectangle has room there.
+"""Space for area lights in a room: the free space, and whether a rectangle has room there.
 
 What stands in the way is found with rays, which know every kind of shape alike. A box around the rectangle, larger by
 the clearance on every side, must be empty: no ray of a grid along any of its three axes may meet anything.
@@ -180,7 +180,7 @@ def empty(scene: Scene, lights: Sequence[AreaLight], spacing: float) -> NDArray[
 
 
 def share_of_view(light: AreaLight, camera: PinholeCamera | Camera, aspect: float) -> float:
-    """How much of a camera's image a light covers if nothing hides it, in [0, 1]. aspect: width over height."""
+    """Fraction of a camera's image that a light covers if nothing hides it, in [0, 1]. aspect: width over height."""
     pinhole = camera if isinstance(camera, PinholeCamera) else camera.pinhole
     corners = (light.corners - np.asarray(camera.position)) @ pinhole.frame.T
     visible = _in_front(corners)

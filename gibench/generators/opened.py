@@ -14,16 +14,16 @@ from gibench.generators.parts import FloatArray, Mesh, Room, RoomObject
 from gibench.generators.shell import Wall, footprint_corners, measured_walls
 
 OPENED = ("none", "ceiling", "stage")
-"""What is taken away: nothing, the ceiling, or the ceiling and one wall."""
+"""Parts that are taken away: nothing, the ceiling, or the ceiling and one wall."""
 
 HANGING = frozenset({"ceiling_panel", "downlight"}) | {n for n, f in FAMILIES.items() if f.mount == "ceiling"}
 ON_WALLS = frozenset({"splashback"}) | {n for n, f in FAMILIES.items() if f.mount == "wall"}
 
 CLOSE = 0.15
-"""What hangs no farther from a wall than this hangs on it, m."""
+"""Largest distance from a wall of things that hang on it, m."""
 
 STANDS = 0.02
-"""What begins no higher above a thing than this stands on it, m."""
+"""Largest height above a thing of things that stand on it, m."""
 
 
 class UnknownOpening(GibenchError):

@@ -1,4 +1,4 @@
-"""What fills the holes in walls: a door with frame and handle, windows with frame and sill.
+"""Fillings of the holes in walls: a door with frame and handle, windows with frame and sill.
 
 Everything is built in the frame of its wall: x along the wall, y into the room (0 on the wall's face), z up.
 """

@@ -1,4 +1,4 @@
-"""Which part of a room is made of what: the choices that make its things belong together."""
+"""Materials of the parts of a room: the choices that make its things belong together."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What lies outside the windows, as one panorama that goes with the room.
+"""The world outside the windows, as one panorama that goes with the room.
 
 A sun-and-sky model is evaluated once here rather than at every path vertex: the model is a third of what a furnished
 room's kernel has to compile and a fifth of its time, and its numbers are part of the compiled code, so that no room

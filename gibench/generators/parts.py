@@ -1,4 +1,4 @@
-"""What a room is made of: meshes, materials, lights, cameras and the room that holds them.
+"""The parts of a room: meshes, materials, lights, cameras and the room that holds them.
 
 Plain data with no randomness and no renderer in it. Generators build these values, `scene_files` writes them.
 World frame: right-handed, metres, Z up, floor at z = 0.
@@ -167,7 +167,7 @@ class Camera:
 
     @property
     def pinhole(self) -> PinholeCamera:
-        """What renders it."""
+        """The camera as the renderer takes it."""
         return PinholeCamera(
             self.position, self.target, self.fov, self.up, self.principal_point, self.mirrored
         )
@@ -187,7 +187,7 @@ class Camera:
 
 @dataclass(frozen=True)
 class Environment:
-    """What lies outside the windows: kind "none", "sunsky" or "hdr".
+    """The world outside the windows: kind "none", "sunsky" or "hdr".
 
     sunsky: sun_direction (3,) towards the sun, turbidity, albedo and `scale`, which turns Mitsuba's values into
     W·m⁻²·sr⁻¹. hdr: path of an equirectangular file, rotation about Z (radians), scale.

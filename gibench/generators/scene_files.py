@@ -191,7 +191,7 @@ def light_element(light: Light) -> Element:
 
 
 def describe(room: Room) -> dict[str, Any]:
-    """What room.json holds: everything but meshes and pixels, JSON-able, in a fixed order."""
+    """Content of room.json: everything but meshes and pixels, JSON-able, in a fixed order."""
     return {
         "seed": room.seed,
         "index": room.index,
@@ -245,7 +245,7 @@ def _outside(environment: Environment) -> Any:
 
 
 def camera_records(cameras: Sequence[Camera]) -> list[dict[str, Any]]:
-    """What room.json says of cameras."""
+    """Cameras as room.json holds them."""
     return [
         {
             "position": _plain(camera.position),
@@ -260,7 +260,7 @@ def camera_records(cameras: Sequence[Camera]) -> list[dict[str, Any]]:
 
 
 def lighting_records(lightings: Sequence[Lighting]) -> dict[str, Any]:
-    """What room.json says of the light of each camera, in the same order; nothing where all have the room's own."""
+    """Light of each camera as room.json holds it, in the same order; nothing where all have the room's own."""
     return {"lightings": [lighting_record(lighting) for lighting in lightings]} if lightings else {}
 
 

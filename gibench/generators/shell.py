@@ -114,7 +114,7 @@ class Shell:
 
     @property
     def skirting_depth(self) -> float:
-        """How far the skirting stands out from the wall, metres."""
+        """Depth of the skirting in front of the wall, metres."""
         return float(self.parameters["skirting"][1])
 
 

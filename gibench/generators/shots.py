@@ -28,7 +28,7 @@ AnyRoom = TypeVar("AnyRoom", bound="Room | ImportedRoom")
 
 
 class Lights(Protocol):
-    """Where the light of frames comes from."""
+    """Source of the light of frames."""
 
     def one(self, rng: np.random.Generator, cameras: Sequence[Camera]) -> Lighting:
         """A lighting that the frames of these cameras share."""
@@ -88,7 +88,7 @@ class AreaLights:
 
 
 def light_space(room: Room | ImportedRoom) -> LightSpace:
-    """Where area lights of a room may be. Raises NoFreeSpace, BackendError."""
+    """Space for the area lights of a room. Raises NoFreeSpace, BackendError."""
     from gibench.rendering.backend import select_variant
 
     select_variant()  # before anything loads Mitsuba, so that it finds the right LLVM
@@ -126,7 +126,7 @@ def _rng(room: Room | ImportedRoom, *number: int) -> np.random.Generator:
 
 
 def shot_of(room: Room | ImportedRoom, view: int) -> Shot:
-    """What a frame of a room is made from."""
+    """The camera and the light of a frame of a room."""
     camera = room.cameras[view]
     lighting = room.lightings[view] if room.lightings else Lighting()
     return Shot(camera.pinhole, lighting)

@@ -23,7 +23,7 @@ OUTSIDE_SHARE = 0.35  # most of the view that may leave through windows
 
 @dataclass(frozen=True)
 class View:
-    """What a candidate sees. reason: why it is refused, empty if it is not. objects: how many things it sees."""
+    """Findings about a candidate. reason: why it is refused, empty if it is not. objects: how many things it sees."""
 
     camera: Camera
     reason: str

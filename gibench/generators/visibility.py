@@ -1,4 +1,4 @@
-"""Which thing a ray meets first, asked of meshes in memory before any file is written."""
+"""The first thing that a ray meets, asked of meshes in memory before any file is written."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Surface = tuple[FloatArray, IntArray]  # vertices (V, 3), metres, and faces (F, 
 
 
 class Caster(Protocol):
-    """What tells which thing a ray meets first."""
+    """Casts rays at the meshes of things."""
 
     def cast(
         self, origins: FloatArray, directions: FloatArray

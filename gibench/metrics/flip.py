@@ -116,7 +116,7 @@ class FlipFilters:
 
     @property
     def radius(self) -> int:
-        """How far a pixel's error reaches, in pixels."""
+        """Radius of a pixel's error, in pixels."""
         return max(len(self.sensitivity[0][0][1]), len(self.smooth)) // 2
 
 

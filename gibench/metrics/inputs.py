@@ -1,4 +1,4 @@
-"""What every metric asks of its arrays, checked in one place and answered with where and how many."""
+"""Checks of the arrays of every metric, made in one place and answered with where and how many."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ from gibench.metrics.pixelwise import Float64, linear_error
 from gibench.metrics.registry import register
 
 EPSILON = 0.01
-"""What Rousselle et al. 2011 add to the squared reference, and Vogels et al. 2018 to the sum of both values, so that
+"""Added to the squared reference by Rousselle et al. 2011, and to the sum of both values by Vogels et al. 2018, so that
 near-black pixels do not decide the mean."""
 
 SMALLEST, LARGEST = 1e-140, 1e140

@@ -58,7 +58,7 @@ FILES: dict[Net, WeightsFile] = {
 
 @dataclass(frozen=True)
 class WeightsState:
-    """What lies in the cache.
+    """Content of the cache.
 
     Attributes:
         state: "cached" when both files are whole, "corrupt" when one is not the pinned one, else "missing".

@@ -1,4 +1,4 @@
-"""What is known of each metric, and where all of them are listed."""
+"""Descriptors of the metrics, and the list of all."""
 
 from __future__ import annotations
 

@@ -16,14 +16,14 @@ from gibench.metrics.inputs import FloatArray, Mask, check_finite, float_array
 from gibench.metrics.pixelwise import Float64
 
 PIXEL_TOLERANCE = 1e-3
-"""What motion in float32 is exact to: smaller weights do not count, nor does so little beyond the border."""
+"""Precision of motion in float32: smaller weights do not count, nor does so little beyond the border."""
 
 SURFACE_TOLERANCE = 0.25
-"""How far, as a share of the distance between neighbouring samples, a reprojected point may lie from its own
+"""Largest distance, relative to that between neighbouring samples, of a reprojected point from its own
 position. On a smooth surface the interpolated position is off by a few hundredths, across an edge by more."""
 
 ROUNDING_TOLERANCE = 1e-5
-"""What float32 leaves unsure of a position, as a share of its largest coordinate."""
+"""Uncertainty of a position in float32, relative to its largest coordinate."""
 
 
 class Taps(NamedTuple):

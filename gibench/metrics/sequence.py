@@ -1,4 +1,4 @@
-"""What the metrics of sequences in time have in common."""
+"""Common base of the metrics of sequences in time."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class TemporalError:
 
     @property
     def value(self) -> float:
-        """What the metric ranks by."""
+        """The value that the metric ranks by."""
         return _mean(self.value_frames)
 
     @property

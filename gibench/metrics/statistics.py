@@ -1,4 +1,4 @@
-"""How sure a mean over frames is, when the frames come from rooms and the method from seeds.
+"""Confidence intervals of means over frames, when the frames come from rooms and the method from seeds.
 
 Frames of one room resemble each other, so that a hundred frames of three rooms say little more than three numbers: a
 room counts by the mean of its frames, and every room weighs the same. Seeds of a method that is trained are a factor
@@ -150,7 +150,7 @@ def _by_room(table: NDArray[np.float64], index: NDArray[np.intp]) -> NDArray[np.
 
 
 def _of_seeds(table: NDArray[np.float64]) -> tuple[float, float]:
-    """What seeds add to the variance of the mean of (S, R), and the sum of squares over degrees of freedom.
+    """Contribution of seeds to the variance of the mean of (S, R), and the sum of squares over degrees of freedom.
 
     What a seed and a room have together is in the spread of the rooms already, and is taken out.
     """

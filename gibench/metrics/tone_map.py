@@ -16,7 +16,7 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 """Luminance of linear Rec. 709 RGB (ITU-R BT.709-6, item 3.2)."""
 
 MIDDLE_GREY = 0.18
-"""Where the exposure puts the reference's median: the reflectance of a photographer's grey card, and the key
+"""Value that the exposure maps the reference's median to: the reflectance of a photographer's grey card, and the key
 value of Reinhard et al. 2002 (Photographic tone reproduction for digital images, section 3)."""
 
 DARKEST_LIT = float(np.finfo(np.float32).tiny)

@@ -1,8 +1,8 @@
 """Choice of the Mitsuba variant, and of the LLVM library that its CPU backend compiles with.
 
 Dr.Jit loads LLVM at run time and aborts the process with versions before 19, which Linux distributions still
-install. The library therefore comes from the PyPI package `karellen-llvm-core`, unless the user has set
-DRJIT_LIBLLVM_PATH, which wins.
+install. The library therefore comes from the PyPI package `karellen-llvm-core` (see `gibench.llvm`), unless the user has
+set DRJIT_LIBLLVM_PATH, which wins.
 """
 
 from __future__ import annotations
@@ -23,9 +23,8 @@ from pathlib import Path
 from typing import Any
 
 from gibench.errors import GibenchError
+from gibench.llvm import LLVM_PACKAGE, LLVM_VARIABLE, packaged_llvm
 
-LLVM_VARIABLE = "DRJIT_LIBLLVM_PATH"
-LLVM_PACKAGE = "karellen-llvm-core"
 MINIMUM_LLVM = 19
 """Dr.Jit 1.5 stops with "Cannot select: fminimum" under LLVM 14 to 16; 19 to 23 are known to work."""
 
@@ -70,19 +69,6 @@ def _llvm_version(path: str) -> str:
     return ".".join(str(p.value) for p in parts)
 
 
-def _packaged_llvm() -> str | None:
-    """The library that `karellen-llvm-core` put into this environment."""
-    try:
-        files = importlib.metadata.files(LLVM_PACKAGE) or []
-    except importlib.metadata.PackageNotFoundError:
-        return None
-    pattern = re.compile(r"(libLLVM(-\d+)?(\.so(\.[\d.]+)?|\.dylib)|LLVM-C\.dll|LLVM\.dll)$")
-    found = [Path(str(f.locate())) for f in files if pattern.match(f.name)]
-    # The fully versioned file is the library itself, the others are links to it.
-    found = sorted((p for p in found if p.exists()), key=lambda p: len(p.name), reverse=True)
-    return str(found[0].resolve()) if found else None
-
-
 def _system_llvm() -> list[str]:
     """LLVM libraries where Linux and Homebrew keep them, newest first."""
     folders = ["/usr/lib", "/usr/lib64", "/usr/local/lib", f"/usr/lib/{platform.machine()}-linux-gnu"]
@@ -101,9 +87,10 @@ def find_llvm() -> LlvmLibrary | None:
     An old system library is returned too where nothing better exists, marked as not `usable`, so that it can be
     reported; `select_variant` never loads it.
     """
-    if chosen := os.environ.get(LLVM_VARIABLE):
+    chosen, packaged = os.environ.get(LLVM_VARIABLE), packaged_llvm()
+    if chosen and chosen != packaged:
         return LlvmLibrary(chosen, _llvm_version(chosen), "environment")
-    if packaged := _packaged_llvm():
+    if packaged:
         return LlvmLibrary(packaged, _llvm_version(packaged), "package")
     for path in _system_llvm():
         # By name only: an old library must not even be mapped into the process.
@@ -133,16 +120,20 @@ def _works(variant: str) -> str | None:
 
     try:
         mi.set_variant(variant)
+        if variant.startswith("llvm"):
+            _refuse_old_llvm()
         scene = mi.load_dict({"type": "scene", "shape": {"type": "rectangle"}})
         distance = scene.ray_intersect(mi.Ray3f([0, 0, 1], [0, 0, -1])).t
         value = float(distance if variant.startswith("scalar") else distance[0])
+    except BackendError:
+        raise
     except Exception as error:
         return str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
     return None if abs(value - 1) < 1e-5 else f"a ray of length 1 came back with length {value}"
 
 
 def _prepare(variant: str) -> str | None:
-    """What keeps `variant` from being tried at all, or None. Points Dr.Jit at the right LLVM."""
+    """The reason why `variant` cannot be tried at all, or None. Points Dr.Jit at the right LLVM."""
     if variant.startswith("cuda") and find_gpu() is None:
         return "no CUDA device was found"
     if variant.startswith("llvm"):
@@ -154,26 +145,29 @@ def _prepare(variant: str) -> str | None:
     return None
 
 
-@cache
 def _refuse_old_llvm() -> None:
     """Raises BackendError where Dr.Jit has loaded an LLVM that aborts the process at the first kernel.
 
-    So it does when a variant is set by `mitsuba.set_variant` before `select_variant` could point at a better one.
+    So it does when it is imported before gibench, which names a better one. To be called once LLVM is loaded.
     """
     maps = Path("/proc/self/maps")
     if not maps.exists():
         return
-    old = None
-    for path in set(re.findall(r"/\S*libLLVM\S*", maps.read_text(encoding="utf-8", errors="replace"))):
+    loaded = {
+        str(Path(path).resolve()): path
+        for path in re.findall(r"/\S*libLLVM\S*", maps.read_text(encoding="utf-8", errors="replace"))
+    }
+    named = os.environ.get(LLVM_VARIABLE)
+    if not loaded or (named and str(Path(named).resolve()) in loaded):
+        return  # an old one beside it belongs to the graphics driver
+    for path in loaded.values():
         in_name = re.search(r"(\d+(?:\.\d+)*)", Path(path).name)
-        if LLVM_VARIABLE in os.environ or in_name is None or _major(in_name.group(1)) >= MINIMUM_LLVM:
-            return  # an old one beside it belongs to the graphics driver
-        old = path
-    if old is not None:
-        raise BackendError(
-            f"a variant was set before gibench and loaded {old}, which is older than LLVM {MINIMUM_LLVM} and aborts at "
-            "the first kernel: call gibench.rendering.backend.select_variant() instead of mitsuba.set_variant()"
-        )
+        if in_name is None or _major(in_name.group(1)) >= MINIMUM_LLVM:
+            return
+    raise BackendError(
+        f"Dr.Jit was imported before gibench and loaded {path}, which is older than LLVM {MINIMUM_LLVM} and aborts at "
+        "the first kernel: import gibench before mitsuba and drjit"
+    )
 
 
 def select_variant(name: str = "auto") -> str:
@@ -212,7 +206,7 @@ def is_scalar() -> bool:
 
 
 def registry_key(kind: str, plugin: Any) -> int:
-    """What identifies a plugin inside a kernel: its registry index, or the object itself in scalar mode.
+    """Key of a plugin inside a kernel: its registry index, or the object itself in scalar mode.
 
     kind: name of its pointer type in Mitsuba, such as "BSDFPtr".
     """
@@ -270,7 +264,7 @@ def versions() -> dict[str, str]:
 
 
 def describe() -> dict[str, object]:
-    """What rendering would use here, for `gibench doctor` and for a dataset's record.
+    """Backend, libraries and versions that rendering would use here, for `gibench doctor` and for a dataset's record.
 
     Keys: variant (str, or None with `problem`), llvm (path, version, origin, usable; or None), gpu (name or
     None), denoiser (version or None), versions, notes (list of str: what is missing and the command that mends it).

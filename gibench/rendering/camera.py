@@ -93,7 +93,7 @@ class PinholeCamera:
 
     @property
     def look_at_up(self) -> tuple[float, float, float]:
-        """What a look-at transform takes as up: Z, or the top of the image where that is not as good as the same.
+        """The up vector of a look-at transform: Z, or the top of the image where that is not as good as the same.
 
         A mirror image is not in it.
         """
@@ -105,7 +105,7 @@ class PinholeCamera:
         return 0.5 * width / float(np.tan(0.5 * self.fov))
 
     def centre(self, resolution: tuple[int, int]) -> tuple[float, float]:
-        """Where the optical axis meets an image of (width, height): x and y in pixels from its upper left corner."""
+        """Principal point in an image of (width, height): x and y in pixels from its upper left corner."""
         (width, height), (x, y) = resolution, self.principal_point
         return 0.5 * width + x * width, 0.5 * height + y * height
 

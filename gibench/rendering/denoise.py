@@ -20,14 +20,14 @@ from gibench.errors import GibenchError
 Image = NDArray[np.float32]
 
 KEY = 0.18
-"""Where the mean of the input is put before the network sees it. The geometric mean, which is usual for images, is that
+"""Mean that the input is scaled to before the network sees it. The geometric mean, which is usual for images, is that
 of the dust where a part of the light is black but for some highlights."""
 
 BANDS = 8
 """Of brightness, with equal light in each, that the light of a denoised image is compared in with its samples."""
 
 MOST_GAIN = 2.0
-"""What a band is brightened or darkened by at most: what is lost beyond that cannot be put back where it was."""
+"""Largest factor that a band is brightened or darkened by: what is lost beyond that cannot be put back where it was."""
 
 LARGEST_SCALE = 1e37
 

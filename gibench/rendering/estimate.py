@@ -174,7 +174,7 @@ def _traced(
     max_depth: int,
     guides: bool,
 ) -> tuple[dict[str, Any], Any, Any, Any]:
-    """What `_Launched` holds of a block, on the device; squares over the squared mean."""
+    """The sums of a block that `_Launched` holds, on the device; squares over the squared mean."""
     import drjit as dr
     import mitsuba as mi
 

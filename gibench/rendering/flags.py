@@ -21,7 +21,7 @@ SHARP: int
 """Lobes that reflect or let through in a single direction."""
 
 HIT_WITH_CURVATURE: int
-"""How a surface interaction is computed whose normal has derivatives."""
+"""Ray flags for surface interactions with derivatives of the normal."""
 
 
 def _masks() -> dict[str, int]:

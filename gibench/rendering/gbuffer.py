@@ -42,7 +42,7 @@ def mirror_direction(si: Any, towards: Any) -> Any:
 
 
 class Hit:
-    """What rays hit, with what several channels share.
+    """Hits of rays, with the terms that several channels share.
 
     rays: mi.Ray3f. si: mi.SurfaceInteraction3f. valid: whether there is something. bsdf: mi.BSDFPtr.
     """

@@ -33,7 +33,7 @@ RR_CAP = 0.95
 
 @dataclass
 class PathSample:
-    """What one path a lane brings home: (lanes,) arrays of mi.Color3f, radiance in W·m⁻²·sr⁻¹.
+    """Radiance of one path a lane: (lanes,) arrays of mi.Color3f in W·m⁻²·sr⁻¹.
 
     albedo and normal (world space, towards the viewer) of the first hit are None unless asked for.
     """

@@ -27,7 +27,7 @@ ALPHAS = (0.05, 0.13, 0.34)
 """GGX roughness of the bases after the Lambertian one."""
 
 GUIDES = ("albedo", "normal")
-"""What a denoiser needs beside the cues; the albedo is that of the materials that stand in."""
+"""Guides of a denoiser beside the cues; the albedo is that of the materials that stand in."""
 
 
 class _Bases:
@@ -80,7 +80,7 @@ def light_cues(scene: Scene, sampler: Any, rays: Any) -> dict[str, Any]:
     bases, context = _Bases(front), mi.BSDFContext()
 
     def values(towards: Any, active: Any) -> list[Any]:
-        """What each of the four reflects from a local direction, mi.Color3f."""
+        """BSDF values of the four for a local direction, mi.Color3f."""
         kept = bsdf.eval(context, si, towards, active & own)
         others = bases.values(mi.Vector3f(towards.x, towards.y, towards.z * side))
         return [dr.select(own, kept, mi.Color3f(value)) for value in others]

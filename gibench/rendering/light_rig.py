@@ -37,7 +37,7 @@ _CONSTANT = for_envmap(np.ones((HEIGHT, 2 * HEIGHT, 3)))
 
 
 class Lights:
-    """What lights a scene now, for kernels to read.
+    """The lighting of a scene now, as arrays that kernels read.
 
     lighting: as it was set. centre: mi.Point3f of an area light, m. placed: mi.Float, 1 where there is one, else 0.
     """
@@ -111,7 +111,7 @@ class LightRig:
         self.set(Lighting())
 
     def _own_lamps(self, ids: dict[str, str]) -> list[_Lamp]:
-        """What lights the scene but for the rig's own two. ids: of the parts, by the names that they have now."""
+        """Lights of the scene but for the rig's own two. ids: of the parts, by the names that they have now."""
         names = [n for n in self._parameters.keys() if n.partition(".")[0] not in (RECTANGLE, SKY)]  # noqa: SIM118
         lamps = []
         for weight in (n for n in names if n.endswith(".sampling_weight")):
@@ -182,7 +182,7 @@ class LightRig:
         return bright
 
     def _switch(self, own: bool, area: bool, sky: bool) -> None:
-        """Which lights shine, and so which of them are sampled."""
+        """Turn lights on and off, and with them their sampling."""
         for lamp in self._lamps:
             if self._lit[lamp.weight] != own or self.lighting is None:
                 for name, value in lamp.dimmers.items():

@@ -1,4 +1,4 @@
-"""What lights a frame: an area light, an environment, or the scene's own light. A shot is a camera under a lighting.
+"""Lighting of a frame: an area light, an environment, or the scene's own light. A shot is a camera under a lighting.
 
 `light_rig.LightRig` lights a loaded scene with them.
 """
@@ -155,7 +155,7 @@ class Lighting:
 
 @dataclass(frozen=True)
 class Shot:
-    """What a frame is made from: a camera, and the lighting that it sees the scene under."""
+    """A camera, and the lighting that it sees the scene under."""
 
     camera: PinholeCamera
     lighting: Lighting = Lighting()

@@ -87,7 +87,7 @@ def eval_pdf_sample_specular(
 
 
 def _specular_weight(layers, bsdf, si, bounce, weight, active):
-    """What a sample of all lobes weighs for the specular ones."""
+    """Weight of a sample of all lobes for the specular ones."""
     smooth = active & ~mi.has_flag(bounce.sampled_type, mi.BSDFFlags.Delta) & (bounce.pdf > 0)
     diffuse = diffuse_lobe(layers, bsdf, si, bounce.wo, smooth)
     return split(bsdf, weight, dr.select(smooth, diffuse * _inverse(bounce.pdf), 0))[1]

@@ -64,7 +64,7 @@ class Replay:
 
     @property
     def recordings(self) -> int:
-        """How often it was recorded."""
+        """Number of recordings so far."""
         return int(self._frozen.n_recordings)
 
     def __call__(self, *arguments: Any) -> Any:
@@ -79,7 +79,7 @@ def arrays_of(thing: Any) -> dict[str, Any]:
 
 
 def camera_arrays(camera: PinholeCamera, resolution: tuple[int, int]) -> dict[str, Any]:
-    """What a frame's rays depend on, as an argument of a `Replay`."""
+    """The arrays that a frame's rays depend on, as an argument of a `Replay`."""
     return vars(RayGenerator(camera, resolution))
 
 

@@ -56,7 +56,7 @@ class StratifiedSampler:
         self._table = permutations(str(mi.variant()))
 
     def _stratum(self) -> Any:
-        """Which stratum this lane gets in the next dimension: a permutation of its place in the group.
+        """Stratum of this lane in the next dimension: a permutation of its place in the group.
 
         Digits are permuted from the top; the permutation of each depends on those above it (Owen 1995).
         """

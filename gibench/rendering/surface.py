@@ -1,4 +1,4 @@
-"""What a surface is made of, read from its materials' parameters: diffuse albedo, specular albedo, roughness.
+"""Parameters of a surface, read from its materials: diffuse albedo, specular albedo, roughness.
 
 Evaluating the BSDF instead would be wrong off diffuse surfaces: pi times the value of a glossy lobe exceeds 1 by
 orders of magnitude. Parameters reach through two sides, masks, blends, bump and normal maps (`layers`) and may be
@@ -49,7 +49,7 @@ def albedo(scene: Scene, bsdf: Any, si: Any, active: Any) -> Any:
 
 
 def specular_albedo(scene: Scene, bsdf: Any, si: Any, active: Any) -> Any:
-    """What is not reflected diffusely, at normal incidence, mi.Color3f in [0, 1]: 0 for diffuse surfaces and misses.
+    """Reflectance of all but the diffuse lobe at normal incidence, mi.Color3f in [0, 1]: 0 for diffuse ones and misses.
 
     ((η−1)/(η+1))² for a coat, ((η−1)²+k²)/((η+1)²+k²) for a conductor (`material` "none" has η = 0, k = 1: all is
     reflected), each times the BSDF's `specular_reflectance`; for a dielectric that and what it lets through.

@@ -53,7 +53,7 @@ def worst(checks: list[Check]) -> Check:
 
 
 def largest_z(count: int, freedom: float = np.inf) -> float:
-    """What the largest of `count` right z-scores stays below but for a chance of CHANCE (Bonferroni).
+    """Bound on the largest of `count` right z-scores, exceeded with a probability of CHANCE (Bonferroni).
 
     freedom: degrees of freedom, where standard errors are estimated.
     """
@@ -63,7 +63,7 @@ def largest_z(count: int, freedom: float = np.inf) -> float:
 
 
 def not_finite(arrays: dict[str, NDArray[Any]]) -> int:
-    """How many values of a frame are NaN or infinite."""
+    """Number of values of a frame that are NaN or infinite."""
     return int(sum((~np.isfinite(values)).sum() for values in arrays.values()))
 
 

@@ -120,7 +120,7 @@ BELOW = PinholeCamera((0.0, -1.0, 0.5), (0.0, 0.0, 0.0), POINT)
 
 @case("lamp seen through a gap of 1 cm", quick=True)
 def lamp_behind_a_gap() -> Found:
-    """What is seen of a lamp that fills the gap is the gap: 4 % of the samples of the lamp get through."""
+    """The visible part of a lamp that fills the gap is the gap: 4 % of the samples of the lamp get through."""
     scene = behind_a_gap(lamp=lamp((0, 0, 2), (1.2, 0.2), 10.0))
     answer = REFLECTANCE * 10.0 * parallel_rectangle(0.5, 0.005, 1.0)
     frame = seen(scene, BELOW, max_depth=1, resolution=(32, 32))

@@ -79,7 +79,7 @@ def metal_in_uniform_light(alpha: float) -> Found:
 
 
 def split_sum(scene: Any, alpha: float) -> Check:
-    """What image space gathering multiplies its blurred mirror image with, against the quadrature."""
+    """Factor of image space gathering for its blurred mirror image, against the quadrature."""
     checks = []
     for degrees in (0.1, 45, 80):
         hits = first_hits(scene, spot(degrees), (1, 1))

@@ -97,7 +97,7 @@ def frames(site: Site, camera: PinholeCamera, methods: tuple[Method, ...] = METH
 
 
 def wrong_values(frame: Prediction) -> float:
-    """How many values of a frame a method may not give: negative, infinite or NaN."""
+    """Number of values of a frame that no method may give: negative, infinite or NaN."""
     images = [frame.color] if frame.specular is None else [frame.color, frame.specular]
     return float(sum((~(np.isfinite(image) & (image >= 0))).sum() for image in images))
 
@@ -191,7 +191,7 @@ def near_mirror_from_a_probe() -> Found:
 
 
 def looked_up(site: Site, positions: Any) -> Any:
-    """What both probe methods find for points that lie on the probes, seen from the probes."""
+    """Results of both probe methods for points that lie on the probes, seen from the probes."""
     probes = load_probes(site, ProbeSettings(8, 64, 32, 64), UnstructuredLumigraph.maps)
     points = mi.Point3f(np.ascontiguousarray(positions.T, dtype=np.float32))
     camera = mi.Point3f([float(c) for c in positions[0]])

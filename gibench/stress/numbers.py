@@ -43,7 +43,7 @@ SINGLE = 2.0**-24
 """Relative rounding of float32."""
 
 SEAM = 0.0031308
-"""Where the curve of sRGB changes from a line to a power."""
+"""Value at which the curve of sRGB changes from a line to a power."""
 
 
 def drjit(values: Any) -> Any:
@@ -313,7 +313,7 @@ def empty_masks() -> Found:
 
 @case("training inputs from half floats", quick=True)
 def training_inputs() -> Found:
-    """What a network is fed from a file against what was rendered."""
+    """Inputs of a network from a file against the rendered values."""
     lamp = rectangle([0, 0, 1], [0, 0, -1], (0.3, 0.3), bsdf=diffuse(0.0), emitter=area(9e4))
     floor = rectangle([0, 0, 0], [0, 0, 1], (1, 1), bsdf=coat(0.05, 0.4, 0.2, 1e-3))
     scene = load_dict({"type": "scene", "lamp": lamp, "floor": floor})

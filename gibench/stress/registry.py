@@ -1,4 +1,4 @@
-"""What a case is, and where all of them are listed."""
+"""Cases, and the list of all."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ PASS, KNOWN, MENDED, FAIL = "pass", "known", "mended", "FAIL"
 
 @dataclass(frozen=True)
 class Check:
-    """What a case found out about one part of the system.
+    """Finding of a case about one part of the system.
 
     part: one of PARTS. what: the error that was measured, in words. error, bound: ≥ 0, in the same unit; relative
     unless `what` names one. source: where the bound comes from. known: why the bound is not kept, where that is not

@@ -20,7 +20,7 @@ from gibench.rendering.backend import select_variant
 from gibench.stress.registry import Case, Check, Curve, all_cases
 
 NEEDED = ("matplotlib", "torch", "xatlas")
-"""What the cases and the pictures import beside the core."""
+"""Packages that the cases and the pictures import beside the core."""
 
 
 class StressError(GibenchError):

@@ -34,7 +34,7 @@ FIRST_TIMED = 64
 
 @dataclass(frozen=True)
 class Setting:
-    """How frames are sampled. odd: with one sample less than a multiple of 4, so that none are stratified."""
+    """A way of sampling frames. odd: with one sample less than a multiple of 4, so that none are stratified."""
 
     name: str
     odd: bool
@@ -58,7 +58,7 @@ def furnished_room() -> tuple[Scene, PinholeCamera]:
 
 @dataclass(frozen=True)
 class Place:
-    """What is rendered.
+    """A scene to render.
 
     spp: samples from the fewest to the most. samples: in all, of the frames that an error is averaged over, of which
     there are at most `frames`. reference: samples of what they are compared with.

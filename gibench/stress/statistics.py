@@ -1,4 +1,4 @@
-"""What the samples say of themselves: no bias, honest error bars, and a denoiser that takes error away."""
+"""Statistics of the samples: no bias, honest error bars, and a denoiser that takes error away."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def replicates(scene: Scene, camera: PinholeCamera, spp: int) -> tuple[Float64, 
 def coverage(
     color: Float64, error: Float64, truth: Float64 | float, spp: int, *, shared: bool, known: str = ""
 ) -> Check:
-    """How often the 95 % interval of a pixel holds the truth.
+    """Coverage of the 95 % interval of a pixel.
 
     shared: whether the truth is the mean of all frames, this one among them, which is nearer to it than the truth.
     """
@@ -141,7 +141,7 @@ BLUR = (
 )
 
 UNGAINFUL = {("a lamp of 1 mm", 64)}
-"""Where the denoiser's blur is more than the noise."""
+"""Cases in which the denoiser's blur is more than the noise."""
 
 
 @case("denoising {what}", what=tuple(DENOISED), quick=("a gap of 1 cm",))

@@ -40,7 +40,7 @@ def write_tables(report: Report, out: Path) -> list[Path]:
 
 
 def summary(report: Report) -> str:
-    """How many cases and checks there were, by verdict, in one line."""
+    """Number of cases and checks by verdict, in one line."""
     counts = [
         f"{len(report.of(verdict))} {verdict}"
         for verdict in (PASS, KNOWN, MENDED, FAIL)

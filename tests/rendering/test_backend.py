@@ -46,7 +46,7 @@ def test_the_users_choice_wins(tmp_path):
 
 def test_an_old_system_library_is_reported_and_never_loaded(monkeypatch):
     monkeypatch.delenv(backend.LLVM_VARIABLE, raising=False)
-    monkeypatch.setattr(backend, "_packaged_llvm", lambda: None)
+    monkeypatch.setattr(backend, "packaged_llvm", lambda: None)
     monkeypatch.setattr(backend, "_system_llvm", lambda: ["/usr/lib/x86_64-linux-gnu/libLLVM-14.so.1"])
     monkeypatch.setattr(backend, "find_llvm", backend.find_llvm.__wrapped__)
     assert backend.find_llvm().version == "14"
@@ -55,6 +55,17 @@ def test_an_old_system_library_is_reported_and_never_loaded(monkeypatch):
     assert "version 14" in reason
     assert "pip install karellen-llvm-core" in reason
     assert backend.LLVM_VARIABLE not in os.environ
+
+
+def test_importing_gibench_names_the_llvm_that_dr_jit_will_load():
+    """So modules that import Mitsuba at their top may be imported before a variant is selected."""
+    result = run(
+        "import gibench, drjit as dr, mitsuba as mi\n"
+        "from gibench.rendering.integrator import trace_paths\n"
+        "from gibench.rendering.backend import select_variant; select_variant('llvm_ad_rgb')\n"
+        "print(dr.sum(dr.maximum(dr.arange(mi.Float, 10), 5))[0])"
+    )
+    assert result.stdout.split() == ["60.0"], result.stderr
 
 
 def test_unknown_variant_names_the_choices():
@@ -71,8 +82,9 @@ def test_a_variant_that_cannot_run_says_why():
 
 def test_scalar_is_taken_with_a_warning_where_nothing_else_runs():
     result = run(
-        "import logging; logging.basicConfig(); from gibench.rendering import backend as b;"
-        "b._packaged_llvm = lambda: None; b._system_llvm = lambda: []; print(b.select_variant())"
+        "import logging, os; logging.basicConfig(); from gibench.rendering import backend as b;"
+        "del os.environ[b.LLVM_VARIABLE]; b.packaged_llvm = lambda: None;"
+        "b._system_llvm = lambda: []; print(b.select_variant())"
     )
     assert result.stdout.strip() == "scalar_rgb" or backend.find_gpu()
     assert "pip install karellen-llvm-core" in result.stderr or backend.find_gpu()

@@ -1,4 +1,4 @@
-"""What the reconstruction network learns from: training views as the method sees them, and as they are.
+"""Examples for the reconstruction network: training views as the method sees them, and as they are.
 
 Only the stills have a ground truth. The frames that come before them on a path do not exist, so the camera is moved
 back along a line, once for each earlier frame that an input or the temporal loss looks at.
@@ -53,7 +53,7 @@ class Example:
 def cameras_before(
     camera: PinholeCamera, depth: float, count: int, rng: np.random.Generator
 ) -> list[PinholeCamera]:
-    """Where the camera was 1, 2 … count frames ago, on a line in a random direction of the ground, turning steadily.
+    """Cameras of 1, 2 … count frames ago, on a line in a random direction of the ground, turning steadily.
 
     depth: median depth of the view, metres.
     """

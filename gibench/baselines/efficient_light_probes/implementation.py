@@ -24,7 +24,7 @@ MAPS = ("radiance", "material_id", "reflected_position", "reflected_material_id"
 
 
 def _gbuffer(scene, lightmap, camera, width: int, height: int):
-    """What was hit, the light it sends out but for glossy light, and what a search walks over."""
+    """First hits, their radiance but for glossy light, and the surfaces that a search walks over."""
     hits = hits_of_rays(scene, ray_generator(camera), (width, height))
     base = hits.emission + lightmap.diffuse(hits.si, hits.preliminary, hits.active)
     surfaces = surfaces_of(scene, hits)
@@ -33,7 +33,7 @@ def _gbuffer(scene, lightmap, camera, width: int, height: int):
 
 
 def _mirrored(scene, _lightmap, camera, preliminary, glossy, width: int, height: int):
-    """What each glossy hit would reflect if it were a mirror: the point, or the direction where that is nothing.
+    """Mirror hit of each glossy hit: the point, or the direction where that is nothing.
 
     And the mi.PreliminaryIntersection3f of it.
     """
@@ -59,7 +59,7 @@ def _searched(probes: Probes, camera, surfaces, target, far, size, count: int, s
 
 @dataclass
 class Searched:
-    """What a search finds, a lane a camera ray in row order.
+    """Result of a search, a lane a camera ray in row order.
 
     preliminary, mirrored: mi.PreliminaryIntersection3f of camera ray and mirror ray. surfaces: "glossy", "position",
     "normal" and "material" of the first hits. base: mi.Color3f, all light but the glossy one, specular: that. made:

@@ -1,4 +1,4 @@
-"""What the reconstruction network is trained for (Guo et al. 2022, equations 6 to 9)."""
+"""Losses of the reconstruction network (Guo et al. 2022, equations 6 to 9)."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def warped(image: Tensor, motion: Tensor) -> Tensor:
 
 
 def _places(motion: Tensor) -> tuple[Tensor, Tensor]:
-    """Where pixel centres were, (N, 1, H, W) each, in pixels from the outer corner of the first one."""
+    """Former positions of pixel centres, (N, 1, H, W) each, in pixels from the outer corner of the first one."""
     height, width = motion.shape[-2:]
     columns = torch.arange(width, dtype=motion.dtype, device=motion.device) + 0.5
     rows = torch.arange(height, dtype=motion.dtype, device=motion.device)[:, None] + 0.5

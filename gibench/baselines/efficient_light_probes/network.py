@@ -37,7 +37,7 @@ BRIGHTEST = 40.0
 
 @dataclass(frozen=True)
 class Scale:
-    """What makes a scene's numbers alike to a network: exposure (1 / radiance of white) and depth (m)."""
+    """Normalisation of a scene for a network: exposure (1 / radiance of white) and depth (m)."""
 
     exposure: float
     depth: float
@@ -72,7 +72,7 @@ class Modulation(nn.Module):
 
 
 class Concatenation(nn.Module):
-    """What the paper's figure 14 (a) puts in the place of `Modulation`: both features, mixed by one convolution."""
+    """The substitute for `Modulation` in the paper's figure 14 (a): both features, mixed by one convolution."""
 
     def __init__(self, channels: int) -> None:
         """channels: of either features."""
@@ -93,7 +93,7 @@ def _down(inputs: int, channels: tuple[int, ...]) -> nn.ModuleList:
 
 
 FUSIONS = {"modulation": Modulation, "concatenation": Concatenation}
-"""How features of the G-buffers act on those of the image, by name of the method's knob."""
+"""Ways in which features of the G-buffers act on those of the image, by name of the method's knob."""
 
 
 class ReconstructionNetwork(nn.Module):
@@ -119,7 +119,7 @@ class ReconstructionNetwork(nn.Module):
 
     @property
     def parameter_count(self) -> int:
-        """How many numbers are trained."""
+        """Number of trained parameters."""
         return sum(parameter.numel() for parameter in self.parameters())
 
     def forward(self, image: Tensor, guides: Tensor) -> Tensor:

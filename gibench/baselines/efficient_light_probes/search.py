@@ -50,7 +50,7 @@ NONE = -2.0
 
 @dataclass
 class Screen:
-    """What the camera sees, a lane a camera ray in row order.
+    """G-buffer of the camera, a lane a camera ray in row order.
 
     position: mi.Point3f, m. normal: unit mi.Vector3f, towards the viewer. material: mi.UInt32, 0 on a miss. width,
     height: mi.Int32 of one lane. camera: from `replay.camera_arrays`, of a grid of that size.
@@ -64,7 +64,7 @@ class Screen:
     height: Any
 
     def seen_at(self, point: Any, active: Any) -> tuple[Any, Any, Any, Any]:
-        """What the camera sees in the direction of points: position, normal, material and whether it is on the screen.
+        """G-buffer in the direction of points: position, normal, material and whether it is on the screen.
 
         The position lies where the camera ray through the point meets the tangent plane of the pixel that it falls
         into: on a plane it is the point itself, not the centre of a pixel.
@@ -114,7 +114,7 @@ class Screen:
 
 @dataclass
 class Reflected:
-    """What is to be found: mi.Point3f, m, or a unit direction where a mirror ray leaves the scene (`far`, mi.Bool)."""
+    """Target of the search: mi.Point3f, m, or a unit direction where a mirror ray leaves the scene (`far`, mi.Bool)."""
 
     target: Any
     far: Any
@@ -125,7 +125,7 @@ class Reflected:
 
 
 def mirror_point(probe: Any, reflected: Reflected, point: Any, normal: Any) -> tuple[Any, Any]:
-    """Where a plane mirrors what is reflected to a probe: mi.Point3f, and whether it does (mi.Bool).
+    """Point of a plane that mirrors the reflected point to a probe: mi.Point3f, and whether it does (mi.Bool).
 
     probe: mi.Point3f. The plane goes through `point`; probe and what is reflected must lie on the side of its normal.
     """

@@ -1,4 +1,4 @@
-"""What the frames before hold for this one (Guo et al. 2022, section 4.4, "Temporal reprojection").
+"""Reprojection of the frames before into this one (Guo et al. 2022, section 4.4, "Temporal reprojection").
 
 Two frames are brought to where their surfaces are now and added with falling weights. A pixel takes from them what
 lies on its own material and in its tangent plane: all else was hidden then.
@@ -23,7 +23,7 @@ OFF_PLANE = 0.01
 
 
 def reprojected(now: dict[str, Any], past: dict[str, Any], width, height) -> tuple[Any, Any]:
-    """What an earlier frame holds at the points of this one: radiance, mi.Color3f, and the share that is known.
+    """An earlier frame at the points of this one: radiance, mi.Color3f, and the share that is known.
 
     now, past: "position", "normal", "material" and "color", a lane a camera ray in row order, and "camera", from
     `replay.camera_arrays`. width, height: mi.Int32 of one lane. Mixed from the four nearest rays of the earlier frame;

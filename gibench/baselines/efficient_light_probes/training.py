@@ -55,7 +55,7 @@ PATIENCE = 0.5
 
 @dataclass(frozen=True)
 class Plan:
-    """What decides a training, beside its examples.
+    """Settings of a training, beside its examples.
 
     epochs: passes over the views. crop: pixels along a side. fusion: of the network. lpips: whether there is the
     perceptual loss, temporal: earlier frames in the inputs and the temporal loss.
@@ -145,7 +145,7 @@ def scale_of(examples: Sequence[Example]) -> Scale:
 
 
 class Crops(NamedTuple):
-    """What a step learns from: examples, a window of each, and the window within these for the perceptual loss."""
+    """Batch of a step: examples, a window of each, and the window within these for the perceptual loss."""
 
     examples: list[Example]
     windows: list[Window]

@@ -33,7 +33,7 @@ SMALL = 0.25
 
 @dataclass
 class Guides:
-    """What keeps pixels apart, a lane a pixel in row order.
+    """Features of pixels that keep them apart, a lane a pixel in row order.
 
     normal: unit mi.Vector3f. depth: mi.Float, m. material: mi.UInt32. width, height: mi.Int32 of one lane. unit:
     mi.Float of one lane, metres that count as one.

@@ -1,4 +1,4 @@
-"""How widely a rough surface spreads a point that it reflects over the image.
+"""Footprint in the image of a point that a rough surface reflects.
 
 Rodriguez et al. 2020, section 6.1: a camera looks straight at a plane which reflects a point on the camera's axis. The
 GGX lobe, evaluated at every place of the image, is fitted with a Gaussian. All of it depends on the two distances by
@@ -51,7 +51,7 @@ REDUCED = 0.5
 
 
 def lobe(alpha: Any, share: Any, radius: Any) -> Any:
-    """What places of the image reflect of a small lamp at the point, by the GGX lobe without Fresnel's factor.
+    """Reflection of a small lamp at the point by places of the image, by the GGX lobe without Fresnel's factor.
 
     The cosine and the lamp's distance are part of it: without them lobes swell where the point is near. Relative to the
     lamp's light at the centre. alpha: roughness. share: d_r / (d_c + d_r), of the distances from the plane to the point

@@ -45,7 +45,7 @@ RECORD = 6
 """Words of 32 bits a texel in the table that the search reads."""
 
 OCTAHEDRON = Octahedral(65535, 65535)
-"""Where directions are stored: 16 bits along each side, errors below 1e-4."""
+"""Storage of directions: 16 bits along each side, errors below 1e-4."""
 
 MAPS = (
     "radiance",
@@ -59,7 +59,7 @@ MAPS = (
 
 @dataclass
 class Wanted:
-    """What a pixel shows, to be found in the probes; a lane a pixel.
+    """Target of a pixel's search in the probes; a lane a pixel.
 
     mirror: the point of the surface. material: mi.UInt32, of the surface. target: what it mirrors, mi.Point3f (m), or
     the unit direction where that is infinitely far. far: mi.Bool. reflected: mi.UInt32, material of what is mirrored,
@@ -204,8 +204,9 @@ class Table:
 
 @dataclass
 class Search:
-    """How to search. All of one lane: order: mi.UInt32, of the perturbation. window: mi.UInt32, samples along a side of
-    the coarse grid. levels: mi.UInt32, 1 without the fine grid. unit: mi.Float, metres of equation 1.
+    """Options of a search, each of one lane.
+
+    order: mi.UInt32, of the perturbation. window: mi.UInt32, samples along a side of the coarse grid. levels: mi.UInt32, 1 without the fine grid. unit: mi.Float, metres of equation 1.
     """
 
     order: Any

@@ -1,4 +1,4 @@
-"""What the frame before showed, for pixels that no probe has a sample for.
+"""The frame before, for pixels that no probe has a sample for.
 
 Rodriguez et al. 2020, section 5.2: their glossy light is that of the last frame, at the place where its camera saw the
 point.

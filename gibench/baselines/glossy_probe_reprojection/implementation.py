@@ -46,7 +46,7 @@ RECALLED = 1.0
 
 
 def _gbuffer(scene, lightmap, camera, width: int, height: int):
-    """What was hit, the light it sends out but for glossy light, and what search and filter know of it."""
+    """First hits, their radiance but for glossy light, and their surfaces for search and filter."""
     hits = hits_of_rays(scene, ray_generator(camera), (width, height))
     base = hits.emission + lightmap.diffuse(hits.si, hits.preliminary, hits.active)
     surfaces = surfaces_of(scene, hits) | {
@@ -68,7 +68,7 @@ def _bent(scene, camera, preliminary, width: int, height: int):
 
 
 def _mirrored(scene, _lightmap, camera, preliminary, glossy, width: int, height: int):
-    """What each glossy hit would reflect if it were a mirror: place, material, and how far away it is.
+    """Mirror hit of each glossy hit: place, material and distance.
 
     The place is a direction where that is infinitely far; the material is 0 there.
     """

@@ -1,4 +1,4 @@
-"""How a mirror point moves with the eye: first and second order on a surface of known curvature.
+"""Motion of a mirror point with the eye: first and second order on a surface of known curvature.
 
 Chen and Arvo 2000 ("Theory and application of specular path perturbation") and Rodriguez et al. 2020, section 5.1: the
 path from p over x to q is stationary among those over the surface f = 0 (Fermat), so x is a function of p, and the
@@ -64,7 +64,7 @@ def _frame(mirror: Mirror) -> tuple[Any, Any]:
 
 
 def displacement(mirror: Mirror, eye: Any, target: Any, far: Any, move: Any, order: Any) -> Any:
-    """How far the mirror point of `target` moves as the eye does, mi.Vector3f, m.
+    """Displacement of the mirror point of `target` as the eye moves, mi.Vector3f, m.
 
     eye: mi.Point3f, p. target: what is mirrored, mi.Point3f, or its unit direction where that is infinitely far (`far`,
     mi.Bool). move: mi.Vector3f, of the eye, Δp. order: mi.UInt32, 0 (no motion at all), 1 (Jacobian) or 2 (Jacobian and

@@ -20,7 +20,7 @@ from gibench.rendering import surface
 
 
 def _gbuffer(scene, lightmap, camera, width: int, height: int):
-    """What was hit, what it sends out but for glossy light, and what the gather must know of it."""
+    """First hits, their radiance but for glossy light, and their surfaces for the gather."""
     hits = hits_of_rays(scene, ray_generator(camera), (width, height))
     base = hits.emission + lightmap.diffuse(hits.si, hits.preliminary, hits.active)
     glossy = hits.glossy
@@ -37,7 +37,7 @@ def _gbuffer(scene, lightmap, camera, width: int, height: int):
 
 
 def _mirrored(scene, lightmap, camera, preliminary, glossy, width: int, height: int):
-    """What each glossy hit would reflect if it were a mirror, and d_r / (d_c + d_r) there."""
+    """Radiance that each glossy hit would reflect if it were a mirror, and d_r / (d_c + d_r) there."""
     first = hits_of_rays(scene, ray_generator(camera), (width, height), preliminary).si
     ray = first.spawn_ray(first.to_world(mi.reflect(first.wi)))
     found = scene.mi_scene.ray_intersect_preliminary(ray, coherent=False, active=glossy)

@@ -16,7 +16,7 @@ LEVELS = 8
 
 @dataclass
 class MirrorImage:
-    """What a gather reads: arrays with a lane a ray, in row order, or a lane a cell.
+    """Inputs of a gather: arrays with a lane a ray, in row order, or a lane a cell.
 
     radiance: mi.Color3f, along the mirror direction, not yet times a reflectance. blur: mi.Float, d_r / (d_c + d_r),
     in [0, 1]. position: mi.Point3f (m). normal: mi.Normal3f, towards the viewer. roughness: mi.Float, GGX alpha.
@@ -35,7 +35,7 @@ _PARTS = ("radiance", "blur", "position", "normal", "roughness")
 
 
 class Layout:
-    """Where the levels lie when they stand one after the other.
+    """Offsets of the levels when they stand one after the other.
 
     sizes: (width, height) by level, each half the one before, rounded up. arrays: the same on the device, evaluated:
     start of each level, width, height.

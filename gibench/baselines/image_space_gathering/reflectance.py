@@ -1,4 +1,4 @@
-"""How much of uniform light the specular lobe of a material reflects towards the viewer."""
+"""Reflectance of the specular lobe of a material towards the viewer, in uniform light."""
 
 # mypy: disable-error-code="no-untyped-def, misc"
 from __future__ import annotations

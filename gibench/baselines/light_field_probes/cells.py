@@ -72,7 +72,7 @@ class Cells:
         dr.make_opaque(self.arrays)
 
     def first(self, point: Any) -> Any:
-        """Where in the table the cell around points (mi.Point3f) begins, mi.UInt32; outside, the one at the edge."""
+        """Offset in the table of the cell around points (mi.Point3f), mi.UInt32; outside, the one at the edge."""
         place = mi.Vector3f(point - self._low) / self._step
         # Before whole numbers, which what is far outside does not fit into.
         at = mi.Vector3i(dr.clip(place, 0, mi.Vector3f(self._cells) - 0.5))

@@ -33,7 +33,7 @@ def environment(scene, direction, active) -> Any:
 
 
 def light_along(scene, field: LightField, point, direction, metre, active) -> tuple[Any, Any, Any]:
-    """What rays bring (mi.Color3f), what became of them, and how many texels were looked at on the way.
+    """Radiance of rays (mi.Color3f), their fate, and the number of texels looked at on the way.
 
     Where no probe knows, the light is that of the nearest in the ray's direction, as if it came from far away.
     """
@@ -47,7 +47,7 @@ def light_along(scene, field: LightField, point, direction, metre, active) -> tu
 
 @dr.syntax
 def glossy_light(scene, layers, field: LightField, sampler, si, bsdf, active, samples, metre):
-    """What hits reflect towards si.wi by their glossy lobe: mi.Color3f, the mean of `samples` rays through the probes.
+    """Radiance that glossy lobes reflect towards si.wi, mi.Color3f: mean of `samples` rays through the probes.
 
     scene: mitsuba.Scene. layers: `Scene.layers`. sampler: mi.Sampler with a lane a hit. samples: mi.UInt32, opaque.
     Exactly 0 where there is no such lobe. Returns besides, of each hit: rays that no probe could follow, texels that

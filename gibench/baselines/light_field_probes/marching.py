@@ -43,11 +43,11 @@ CYCLE = 3
 """Corners of a cell from one probe to the next; with 8 corners every one has its turn."""
 
 MISS, HIT, UNKNOWN = 0, 1, 2
-"""What a probe says of a ray: that nothing is in its way, that it is stopped, or that it passes behind something."""
+"""Verdicts of a probe about a ray: nothing is in its way, it is stopped, or it passes behind something."""
 
 
 def thickness(direction: Any, towards: Any, normal: Any, way: Any, metre: Any) -> Any:
-    """How thick a surface is taken to be, mi.Float in the scene's unit.
+    """Assumed thickness of a surface, mi.Float in the scene's unit.
 
     direction: of the ray. towards: unit mi.Vector3f from the probe. normal: of the surface. way: along the ray to it.
     metre: in the scene's unit. Behind what the probe sees along the ray, and what is seen edge-on, more is hidden.

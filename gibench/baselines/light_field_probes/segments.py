@@ -24,7 +24,7 @@ def octant_planes(origin: Any, direction: Any) -> list[Any]:
 
 
 def segment_end(planes: list[Any], way: Any, last: Any) -> Any:
-    """Where the segment ends that begins at `way`: at the next plane, or at `last`."""
+    """End of the segment that begins at `way`: at the next plane, or at `last`."""
     end = last
     for plane in planes:
         end = dr.select((plane > way) & (plane < end), plane, end)

@@ -1,4 +1,4 @@
-"""Which texels a chart touches, and the points of its triangles that stand for each."""
+"""Texels that a chart touches, and the points of its triangles that stand for each."""
 
 from __future__ import annotations
 

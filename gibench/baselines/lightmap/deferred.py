@@ -1,4 +1,4 @@
-"""What methods on the lightmap share: settings, a finer grid of camera rays, and kernels that are replayed."""
+"""Base of the methods on the lightmap: settings, a finer grid of camera rays, and kernels that are replayed."""
 
 # mypy: disable-error-code="no-untyped-def, misc"
 from __future__ import annotations

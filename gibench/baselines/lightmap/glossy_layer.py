@@ -1,4 +1,4 @@
-"""What methods share whose glossy light is traced from the first hits, over a lightmap, and then denoised."""
+"""Base of the methods whose glossy light is traced from the first hits, over a lightmap, and denoised."""
 
 # mypy: disable-error-code="no-untyped-def, misc"
 from __future__ import annotations
@@ -19,7 +19,7 @@ from gibench.rendering.denoise import denoise
 
 
 def _gbuffer(scene, lightmap, camera, width: int, height: int, denoised: bool):
-    """What was hit, what it sends out but for glossy light, and what guides the denoiser."""
+    """First hits, their radiance but for glossy light, and the guides of the denoiser."""
     hits = hits_of_rays(scene, ray_generator(camera), (width, height))
     base = hits.emission + lightmap.diffuse(hits.si, hits.preliminary, hits.active)
     guides = {}

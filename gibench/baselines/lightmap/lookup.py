@@ -63,7 +63,7 @@ class Lightmap:
         return dr.select(active, irradiance * lobe, 0)
 
     def irradiance(self, si: Any, preliminary: Any, active: Any = True) -> Any:
-        """What is stored, bilinearly interpolated: W·m⁻², the irradiance where the material is Lambert's."""
+        """Stored values, bilinearly interpolated: W·m⁻², the irradiance where the material is Lambert's."""
         offset = dr.gather(mi.UInt32, self._offsets, self._scene.shape_ids(si.shape, active), active)
         active = active & (offset != NONE)
         row = 3 * (offset + preliminary.prim_index)

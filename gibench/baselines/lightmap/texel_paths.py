@@ -64,7 +64,7 @@ class TexelPoints:
 
 
 def hidden(points: TexelPoints, count: int) -> NDArray[np.bool_]:
-    """Which of `count` points are buried or covered, (count,)."""
+    """Mask of the `count` points that are buried or covered, (count,)."""
     result = np.zeros(count, dtype=bool)
     step = LANES // PROBES
     for start in range(0, count, step):

@@ -140,7 +140,7 @@ def _areas(triangles: NDArray[Any]) -> NDArray[np.float64]:
 
 
 def _charts(atlas: Any, mesh: int, faces: int) -> NDArray[np.int64]:
-    """Which chart of the mesh each triangle is in, (F,); −1 for those that xatlas left out as degenerate."""
+    """Chart of the mesh that each triangle is in, (F,); −1 for those that xatlas left out as degenerate."""
     charts = np.full(faces, -1, dtype=np.int64)
     for number in range(atlas.get_mesh_chart_count(mesh)):
         charts[np.asarray(atlas.get_mesh_chart(mesh, number).faces, dtype=np.int64)] = number

@@ -119,7 +119,7 @@ class PathTracer:
         return parts, guides["albedo"]
 
     def _traced(self, view: View) -> dict[str, Any]:
-        """What `trace_rows` gives with a lane a pixel, means over its samples."""
+        """Result of `trace_rows` with a lane a pixel, means over its samples."""
         width, height = view.resolution
         camera = camera_arrays(view.camera, view.resolution)
         rows = max(LANES // (width * self._spp), 1)

@@ -1,4 +1,4 @@
-"""What the probes see, rendered into their maps.
+"""Maps of the probes, rendered.
 
 Five bakes, so that a method pays for what it reads: where the probes stand, the glossy radiance, all of the light, the
 visible surface and the reflected one (Rodriguez et al. 2020, section 4.1). All probes share the passes: a lane is a
@@ -63,7 +63,7 @@ MARGIN = 32
 
 @dataclass(frozen=True)
 class ProbeSettings:
-    """What decides the probes of a scene.
+    """Settings of the probes of a scene.
 
     count: about how many (≥ 1). width: texels around (even). height: from top to bottom. spp: paths a texel.
     denoise: whether radiance goes through Open Image Denoise. mapping: a name in `MAPPINGS`. first_roughness: what
@@ -313,7 +313,7 @@ def _bake_parameterization(
 
 
 def load_warp(settings: ProbeSettings, files: Mapping[str, Path]) -> Warp | None:
-    """Where the texels of probes look, from `baked_files`; None where they are not adaptive."""
+    """Directions of the texels of probes, from `baked_files`; None where they are not adaptive."""
     if settings.mapping != ADAPTIVE:
         return None
     forward, inverse = (np.load(files[name]) for name in (FORWARD, INVERSE))

@@ -1,4 +1,4 @@
-"""What methods that look glossy light up in probes have in common: first hits, the lightmap, and the sum."""
+"""Base of the methods that look glossy light up in probes: first hits, the lightmap, and the sum."""
 
 # mypy: disable-error-code="no-untyped-def, misc"
 from __future__ import annotations
@@ -64,7 +64,7 @@ class ProbeLookup:
         self._gather = Replay(site.scene, partial(_looked_up, self.glossy, probes), probes.arrays)
 
     def render(self, view: View, stages: Stages) -> Prediction:
-        """What is emitted and the diffuse light at the first hits, then the glossy light from the probes."""
+        """Emission and diffuse light at the first hits, then the glossy light from the probes."""
         fine = (view.resolution[0] * self._grid, view.resolution[1] * self._grid)
         camera = camera_arrays(view.camera, fine)
         with stages.stage("g-buffer"):

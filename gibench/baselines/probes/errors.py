@@ -1,4 +1,4 @@
-"""What can go wrong with probes."""
+"""Errors of probes."""
 
 from gibench.errors import GibenchError
 

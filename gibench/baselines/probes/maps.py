@@ -100,7 +100,7 @@ class Probes:
         return self.mapping.direction(at if self._warp is None else self._warp.plain(probe, at))
 
     def stretch(self, probe: Any, at: Any) -> Any:
-        """How wide a texel is at texel coordinates, mi.Float, where 1 is what it is without moved texels.
+        """Width of a texel at texel coordinates, mi.Float, where 1 is what it is without moved texels.
 
         |∂f⁻¹/∂x| in section 5.2 of Rodriguez et al. 2020, as the square root of the Jacobian's determinant.
         """
@@ -137,7 +137,7 @@ class Probes:
         ]
 
     def fetch(self, name: str, texel: Any, active: Any = True) -> Any:
-        """What a map holds at texels: mi.Float, mi.UInt32 (ids) or mi.Vector3f (three components); 0 where inactive."""
+        """Values of a map at texels: mi.Float, mi.UInt32 (ids) or mi.Vector3f (three components); 0 where inactive."""
         array, size = self.arrays[name], MAPS[name][1]
         kind: Callable[..., Any] = mi.UInt32 if name.endswith("_id") else mi.Float
         parts = [kind(dr.gather(type(array), array, texel * size + k, active)) for k in range(size)]

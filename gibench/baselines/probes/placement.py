@@ -1,4 +1,4 @@
-"""Where probes stand: on a regular grid through the free space of a room (Rodriguez et al. 2020, section 4.1).
+"""Placement of probes: on a regular grid through the free space of a room (Rodriguez et al. 2020, section 4.1).
 
 The room is found with rays (`gibench.rendering.free_space`). The grid fills the box of what was found. A grid point
 inside a thing, too close to one, or that the walk does not see, such as a cavity, is dropped: those that stay are as

@@ -1,4 +1,4 @@
-"""What methods know of a frame that search probes for its reflections: glossy surfaces, and what they mirror."""
+"""Glossy surfaces of a frame and their mirror hits, for methods that search probes for reflections."""
 
 # mypy: disable-error-code="no-untyped-def, misc"
 from __future__ import annotations
@@ -26,7 +26,7 @@ def surfaces_of(scene: Scene, hits: FirstHits) -> dict[str, Any]:
 
 @dataclass
 class Mirrored:
-    """What hits would reflect if they were mirrors.
+    """Mirror hits of hits.
 
     ray: mi.Ray3f. found: mi.PreliminaryIntersection3f. far: mi.Bool, whether that is nothing. target: mi.Point3f, m, or
     the direction of the ray where it is.

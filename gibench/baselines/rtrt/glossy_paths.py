@@ -31,7 +31,7 @@ def _scatter(scene, layers, sampler, si, bsdf, active):
 
 @dr.syntax
 def glossy_radiance(scene, layers, lightmap: Lightmap, sampler, si, bsdf, active, samples, bounces):
-    """What hits reflect towards si.wi by their glossy lobe, mi.Color3f, the mean of `samples` paths.
+    """Radiance that hits reflect towards si.wi by their glossy lobe, mi.Color3f, the mean of `samples` paths.
 
     scene: mitsuba.Scene. layers: `Scene.layers`. sampler: mi.Sampler with a lane a hit. samples, bounces: mi.UInt32,
     opaque. At every hit of a path there is what it emits, which next-event estimation at the hit before shares, and its

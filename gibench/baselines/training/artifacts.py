@@ -37,6 +37,6 @@ def kept(folder: Path) -> tuple[Weights, Facts]:
 
 
 def record(folder: Path) -> dict[str, Any] | None:
-    """What the training of a folder was like, as `Trained.record` gives it; None where it holds no training."""
+    """Record of the training of a folder, as `Trained.record` gives it; None where it holds no training."""
     path = folder / RECORD
     return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None

@@ -24,7 +24,7 @@ class Examples(Protocol):
     """Anything with a length and examples by number, such as a `torch.utils.data.Dataset`."""
 
     def __len__(self) -> int:
-        """How many."""
+        """Number of examples."""
 
     def __getitem__(self, index: int, /) -> Any:
         """An example: tensors, numbers, tuples or dicts of them."""

@@ -1,4 +1,4 @@
-"""What a training may spend, and how often it looks at what it has reached."""
+"""Time of a training, and the interval of its looks at the held-out error."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ EVERY_SECONDS = 60.0
 
 
 def machine(device: torch.device) -> dict[str, Any]:
-    """What the bits of a step depend on beside the code: torch, its instructions and threads, processor or GPU."""
+    """Facts that the bits of a step depend on beside the code: torch; its instructions, threads and device."""
     facts = {
         "torch": str(torch.__version__),
         "processor": platform.machine(),

@@ -1,4 +1,4 @@
-"""What a training was like: its curve of held-out error against steps and seconds, and how it ended."""
+"""Record of a training: its curve of held-out error against steps and seconds, and how it ended."""
 
 from __future__ import annotations
 

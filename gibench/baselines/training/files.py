@@ -14,7 +14,7 @@ import torch
 from gibench.baselines.training.errors import CheckpointError, StorageError
 
 UNREADABLE = (OSError, EOFError, RuntimeError, KeyError, ValueError, TypeError, pickle.UnpicklingError)
-"""What reading a damaged file of torch raises."""
+"""Errors that reading a damaged file of torch raises."""
 
 
 def write_tensors(path: Path, content: Mapping[str, Any]) -> None:
@@ -59,6 +59,6 @@ def read_tensors(path: Path, device: torch.device | str = "cpu") -> dict[str, An
 
 
 def unreadable(path: Path, problem: BaseException) -> str:
-    """What to say about a file that holds something else than it should."""
+    """Error message for a file that holds something else than it should."""
     first = (str(problem).splitlines() or [type(problem).__name__])[0]
     return f"{path} cannot be read ({first}): remove it, and it is made anew"

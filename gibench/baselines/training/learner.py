@@ -1,4 +1,4 @@
-"""What is trained: networks, their optimisers, and a step."""
+"""Learners: networks, their optimisers, and a step."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Weights = dict[str, dict[str, Tensor]]
 
 @dataclass(frozen=True)
 class Step:
-    """Where a training stands.
+    """State of a training.
 
     number: steps made before this one. progress: in [0, 1), share of the training that they are, for schedules. random:
     for what this step draws; it depends on nothing but the training's seed and the number, as do torch's own draws.

@@ -135,7 +135,7 @@ class _Run:
             self.warm_seconds += time.perf_counter() - asked
 
     def _plan(self) -> None:
-        """How many steps there will be, once it can be told."""
+        """Number of steps of the whole training, once it is known."""
         if self.planned is None and self.made > WARM:
             assert self.budget.seconds is not None
             spent = self._now()
@@ -144,7 +144,7 @@ class _Run:
                 self.planned = self.budget.planned(self.step, spent, a_step, self.a_look)
 
     def _settle(self, write: Write) -> None:
-        """What comes after a step: losses are read, the held-out error is looked at, the state is kept, or all ends."""
+        """Work after a step: losses are read, the held-out error is looked at, the state is kept, or all ends."""
         ending = self._spent()
         looking = self._look_is_due() or ending is not None
         saving = self.checkpoint is not None and self.checkpoint.due
@@ -205,7 +205,7 @@ class _Run:
             self.checkpoint.write(self._state(), self.owner)
 
     def result(self) -> Trained:
-        """What `train` gives."""
+        """Result of `train`."""
         assert self.ended is not None
         if self.ended == "diverged" and self.best.step == 0:
             raise TrainingError(
@@ -271,4 +271,4 @@ class _Run:
 
 
 _NUMBERS = ("step", "planned", "seconds", "waited", "ended", "a_look")
-"""What a checkpoint keeps of a run, as it is."""
+"""Attributes of a run that a checkpoint keeps."""

@@ -35,7 +35,7 @@ HIDDEN = 10.0
 
 
 def penalty(point: Any, probe: Any, camera: Any) -> Any:
-    """How unlike what a probe sees of a point is to what the camera sees of it: mi.Float > 0. Arguments: mi.Point3f.
+    """Difference between a probe's view of a point and the camera's: mi.Float > 0. Arguments: mi.Point3f.
 
     The angle between the two at the point, radians, and how much farther away the probe is than the camera (sections
     4.1 and 4.2 of Buehler et al.).

@@ -1,4 +1,4 @@
-"""What is read of a run: CSV files, the tables of the papers, plots, and a page that opens from disk."""
+"""Reports of runs: CSV files, the tables of the papers, plots, and a page that opens from disk."""
 
 from gibench.benchmarks.report.source import ReportError as ReportError
 from gibench.benchmarks.report.source import ReportSource as ReportSource

@@ -32,7 +32,7 @@ DAMAGED = (
     ValueError,
     struct.error,
 )
-"""What the reader of archives raises for those that are damaged, encrypted, or of another kind."""
+"""Errors that the reader of archives raises for those that are damaged, encrypted, or of another kind."""
 
 _LINE = re.compile(r"([0-9a-f]{64})  (.+)")
 _PIECE = 1 << 20

@@ -44,12 +44,12 @@ HEIGHT = 4.4
 """Inches."""
 
 ATTEMPTS = 12
-"""How often a plot is made taller, by a quarter each, so that all names find a place."""
+"""Times that a plot is made taller, by a quarter each, so that all names find a place."""
 
 
 @dataclass(frozen=True)
 class Cost:
-    """What an error is plotted against.
+    """A cost that an error is plotted against.
 
     column: of the summary's entries. name: in file names. title: of the plot. axis: what the axis says. unit: what
     the column is divided by. timed: whether values of two machines must not meet in one plot.

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 AXES = (("seconds", "seconds of training, looks included"), ("steps", "steps of training"))
-"""What error is plotted against, a column each, and what its axis says."""
+"""Costs that error is plotted against, a column each, with the titles of their axes."""
 
 CAPTION = (
     "Held-out errors are each method's own measure in its own space: heights compare within a row, never between rows.",

@@ -1,4 +1,4 @@
-"""What plots share: figures, panels, titles, axes of error, noise floors, names at the ends of lines."""
+"""Shared by plots: figures, panels, titles, axes of error, noise floors, names at the ends of lines."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the labels of a plot go, so that none lies on another: plain geometry in pixels.
+"""Placement of the labels of a plot, so that none lies on another: plain geometry in pixels.
 
 Greedy: the labels that must be shown come first, each takes the nearest free place around its point (compare
 Christensen, Marks & Shieber 1995, An empirical study of algorithms for point-feature label placement, ACM TOG 14(3)).
@@ -22,7 +22,7 @@ GAP = 1.5
 """Least distance between two labels."""
 
 COVERED, CROSSED = 25, 60
-"""What it costs, in distance, to cover an obstacle and to let a label and another's line cross."""
+"""Cost, in distance, of covering an obstacle and to let a label and another's line cross."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""How plots look: colours, markers and lines that print in grey and that the colour-blind tell apart, and axes."""
+"""Style of plots: colours, markers and lines that print in grey and that the colour-blind tell apart, and axes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which plots of a run are written, and under what names."""
+"""Plots of a run, and the names of their files."""
 
 from __future__ import annotations
 

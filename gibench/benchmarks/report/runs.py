@@ -32,7 +32,7 @@ def image_part(part: str) -> str:
 
 
 def part_title(part: str) -> str:
-    """How a reader is told what is scored."""
+    """Name of a scored part for readers."""
     of, _, group = part.partition(APART)
     return PARTS.get(of, of) + (f", {group}" if group else "")
 
@@ -67,7 +67,7 @@ class Runs:
 
     @property
     def run(self) -> Mapping[str, Any]:
-        """What is common to the runs, and what is not, side by side."""
+        """Facts common to the runs, and those that differ, side by side."""
         facts = [run.run for run in self._runs]
 
         def both(key: str) -> str:

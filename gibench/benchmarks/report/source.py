@@ -1,4 +1,4 @@
-"""What a report is made from: the tables and images of a run, as `gibench.benchmarks.results` reads them."""
+"""Source of a report: the tables and images of a run, as `gibench.benchmarks.results` reads them."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
 PREPARATION = ("lightmap", "probes", "references", "training")
-"""What preparation is booked as; the columns are prepare_<name>_s."""
+"""Kinds of preparation; the columns are prepare_<name>_s."""
 
 PARTS = {"full": "Full image", "indirect": "Indirect light", "specular": "Specular part"}
-"""What is scored of an image, and how a reader is told."""
+"""Scored parts of an image, with their names for readers."""
 
 
 class ReportError(GibenchError):
@@ -37,11 +37,11 @@ class ReportSource(Protocol):
 
     @property
     def root(self) -> Path:
-        """Where the results lie."""
+        """Folder of the results."""
 
     @property
     def run(self) -> Mapping[str, Any]:
-        """What was run, where and when."""
+        """Record of the run: track, machine, dates."""
 
     @property
     def results(self) -> pd.DataFrame:
@@ -72,10 +72,10 @@ class ReportSource(Protocol):
         """Columns scene, frame, sequence: the name of the sequence that the frame lies in, "" for a still."""
 
     def prediction(self, result: str, frame: int, part: str) -> NDArray[np.float32]:
-        """What a method said, (H, W, 3), linear radiance."""
+        """Prediction of a method, (H, W, 3), linear radiance."""
 
     def reference(self, scene: str, frame: int, part: str) -> NDArray[np.float32]:
-        """What is right, (H, W, 3), linear radiance."""
+        """Reference, (H, W, 3), linear radiance."""
 
     def exposure(self, scene: str, frame: int) -> float:
         """The factor from radiance to display values of a frame of a scene."""

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 ENTRY = ["track", "label", "machine"]
-"""What tells one row of the leaderboard from another. Times of two machines never share a row."""
+"""Key of a row of the leaderboard. Times of two machines never share a row."""
 
 COSTS = ["ms_median", "ms_p95", "prepare_s", *(f"prepare_{name}_s" for name in PREPARATION), "bytes"]
 
@@ -288,7 +288,7 @@ def _difference(
 
 
 def noise_size(metric: Any, floor: float) -> float:
-    """How far the reference's noise alone moves a metric: from its value for equal images to its floor.
+    """Shift of a metric by the reference's noise alone: from its value for equal images to its floor.
 
     NaN where that is not known: no floor, or a metric such as PSNR that is infinite for equal images.
     """

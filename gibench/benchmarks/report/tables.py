@@ -208,7 +208,7 @@ def frame_time(source: ReportSource, summary: Summary, track: str) -> Table:
 
 
 def failed(summary: Summary) -> Table:
-    """What failed, and why."""
+    """Failed results, with the reason."""
     lost = summary.results[summary.results["status"] != "ok"]
     rows = [
         [Cell(str(row.label)), Cell(str(row.scene)), Cell(str(row.seed)), Cell(short_reason(row.reason))]
@@ -290,7 +290,7 @@ def _pipes(cells: Sequence[str]) -> str:
 
 
 _MARKDOWN = {**{sign: f"\\{sign}" for sign in "|\\`"}, "<": "&lt;", ">": "&gt;", "&": "&amp;"}
-"""What would end a cell, or be HTML to who shows the table. Stars are our own: the best of a column."""
+"""Characters that would end a cell, or that a viewer takes for HTML. Stars are our own: the best of a column."""
 
 
 def _markdown(text: str) -> str:

@@ -85,7 +85,7 @@ def trainings(source: ReportSource, summary: Summary) -> list[TrainingCurve]:
 
 
 def _names(summary: Summary, users: list[set[int]]) -> dict[int, str]:
-    """What the training of each entry is called: entries that share one in some room share its name."""
+    """Name of the training of each entry: entries that share one in some room share its name."""
     groups: list[set[int]] = []
     for own in users:
         joined = own.union(*(group for group in groups if group & own))

@@ -1,4 +1,4 @@
-"""How numbers and metrics are written for people: the same in tables, plots and on the page."""
+"""Wording of numbers and metrics for people: the same in tables, plots and on the page."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the formats share: names of frames, pictures for screens, rows as JSON, cameras in OpenGL's convention."""
+"""Shared by the formats: names of frames, pictures for screens, rows as JSON, cameras in OpenGL's convention."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which environment maps somebody means: sets of those that ship, single ones by name, files and folders."""
+"""Names of environment maps resolved: sets of those that ship, single ones by name, files and folders."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How plants grow: leaves on stems in a pot, for the plants on the floor and those on a sill."""
+"""Plants: leaves on stems in a pot, for the plants on the floor and those on a sill."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What several families are put together from: legs, posts, fronts, handles, rows of books."""
+"""Building blocks of several families: legs, posts, fronts, handles, rows of books."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from gibench.generators.shapes import (
 )
 
 EMBED = 0.002
-"""How far (m) one part reaches into the next, so that no two faces lie in one plane."""
+"""Distance (m) that one part reaches into the next, so that no two faces lie in one plane."""
 
 LEG_STYLES = ("square", "tapered", "round", "turned")
 

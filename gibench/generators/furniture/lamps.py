@@ -1,4 +1,4 @@
-"""What the lamps share: a bulb in its socket, and the shade around it."""
+"""Parts that lamps share: a bulb in its socket, and the shade around it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What was done to a scene, as it is noted and told."""
+"""Changes made to a scene, as they are recorded and printed."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Note = Callable[..., None]
 
 @dataclass(frozen=True)
 class Change:
-    """What a rule did somewhere. rule: its name. what: in words. where: "scene.xml:12". loss: the image may differ."""
+    """A change that a rule made. rule: its name. what: in words. where: "scene.xml:12". loss: the image may differ."""
 
     rule: str
     what: str

@@ -39,7 +39,7 @@ def mesh_grids(tree: SceneTree, note: Note) -> None:
 
 
 def surface(grid: NDArray[np.float32]) -> Mesh:
-    """Where distances (Z, Y, X), negative inside, are 0, in the unit cube that the grid spans."""
+    """Surface on which distances (Z, Y, X), negative inside, are 0, in the unit cube that the grid spans."""
     from skimage.measure import marching_cubes
 
     spacing = 1 / (np.array(grid.shape) - 1)

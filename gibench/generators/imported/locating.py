@@ -1,4 +1,4 @@
-"""Where the files of a scene are: each has to be a regular file below the folder of the scene.
+"""Paths of the files of a scene: each has to be a regular file below the folder of the scene.
 
 A scene names files by `<include>`, `<path>`, `<string name="filename">` of any plugin, `<spectrum filename>`, the
 `material` of a conductor, which Mitsuba puts into a file name, and the `mtllib` of an OBJ file with the images in it.
@@ -21,7 +21,7 @@ def is_inside(path: Path, folder: Path) -> bool:
 
 
 def located(name: str, where: str, folders: Sequence[Path], *, allow_outside: bool) -> Path:
-    """Where a file lies that a scene names, whether it is there or not.
+    """Path of a file that a scene names, whether it is there or not.
 
     folders: where it is looked for; the first is that of the scene. A name that differs in case alone will do, as
     scenes made on Windows have such. Raises SceneFileError for what lies outside of the scene's folder and is not

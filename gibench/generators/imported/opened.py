@@ -20,7 +20,7 @@ from gibench.generators.parts import FloatArray
 from gibench.rendering.free_space import fan
 
 DEPTH = 0.05
-"""How far below the ceiling, or before the wall, faces are still a part of it, m."""
+"""Distance below the ceiling, or before the wall, at which faces are still a part of it, m."""
 
 WINDOW = 0.1
 """Heights that differ by less are those of one ceiling, m."""

@@ -1,4 +1,4 @@
-"""Where daylight enters an imported scene: found from rays that leave it, and handed to the renderer as portals.
+"""Openings by which daylight enters an imported scene: found from rays that leave it, and used as portals.
 
 A portal that is too large costs some samples, one that is missed some noise; neither costs a bias
 (`gibench.rendering.portals`).

@@ -168,7 +168,7 @@ def pieces(vertices: NDArray[Any], faces: NDArray[Any]) -> NDArray[np.int64]:
 
 
 class Sides(enum.Enum):
-    """What turning a surface round does to how it looks."""
+    """Effect of turning a surface round on its looks."""
 
     ALIKE, EXCHANGED, DIFFERENT = range(3)
 

@@ -28,7 +28,7 @@ FARTHEST_OFFSET = 100.0
 """Of a principal point, in films."""
 
 ORTHOGONAL = 1e-3
-"""How far a camera's matrix may be from a rotation, as a share; what Mitsuba allows."""
+"""Largest relative deviation of a camera's matrix from a rotation; as Mitsuba allows."""
 
 FULL_FRAME = math.hypot(36.0, 24.0)
 """Diagonal of the film that focal lengths are given for, mm."""
@@ -219,7 +219,7 @@ CONVENTION = "are the columns of its matrix left, up, forward and position?"
 
 
 def _unusual(camera: GivenCamera, matrix: FloatArray) -> Iterator[str]:
-    """What a matrix of another convention looks like, in words."""
+    """Description of a matrix that follows another convention."""
     if camera.mirrored:
         yield f"a mirrored camera is rendered as it is: {CONVENTION}"
     if camera.up is not None:

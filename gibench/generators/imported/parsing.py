@@ -25,7 +25,7 @@ MOST_TEXT = 1 << 26
 
 @dataclass
 class Budget:
-    """What a scene has used of what it may: a kilobyte of includes or parameters can stand for terabytes."""
+    """Budget of a scene's parsing: a kilobyte of includes or parameters can stand for terabytes."""
 
     elements: int = 0
     includes: int = 0

@@ -22,7 +22,7 @@ UPRIGHT: dict[str, FloatArray] = {
     "y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
     "z": np.eye(3),
 }
-"""What turns the axis that is up into +z, by its name: permutations, so that no number is rounded."""
+"""Rotations of the axis that is up into +z, by its name: permutations, so that no number is rounded."""
 
 DIRECTIONAL = ("envmap", "constant", "directional", "sunsky", "timed_sunsky")
 """Emitters without a place: they turn, but do not grow."""

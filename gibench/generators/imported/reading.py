@@ -44,7 +44,7 @@ class SceneTree:
         return self.file.parent
 
     def source(self, name: str, where: str) -> Path | str:
-        """Where a file that the scene names lies; the name itself where it was made during the import."""
+        """Path of a file that the scene names; the name itself where it was made during the import."""
         return name if name in self.made else self.located(name, where)
 
     def content(self, source: Path | str) -> bytes:

@@ -1,4 +1,4 @@
-"""What Mitsuba says of a scene, in terms of the user's files."""
+"""Errors of Mitsuba, in terms of the user's files."""
 
 from __future__ import annotations
 

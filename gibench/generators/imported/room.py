@@ -239,7 +239,7 @@ def scene_element(room: ImportedRoom, *, max_depth: int, resolution: tuple[int, 
 
 
 def describe(room: ImportedRoom) -> dict[str, Any]:
-    """What room.json holds, JSON-able: where the scene came from and everything that was done to it."""
+    """Content of room.json, JSON-able: where the scene came from and everything that was done to it."""
     scene = room.scene
     groups: dict[tuple[str, str, bool], list[str]] = {}
     for change in scene.changes:

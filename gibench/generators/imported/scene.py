@@ -48,7 +48,7 @@ DEFAULT_DEPTH = -1
 
 @dataclass(frozen=True)
 class ImportSettings:
-    """How scene files are read.
+    """Options for reading scene files.
 
     up: axis of the file that is up: "x", "y", "z" or "auto" (`placing.up_axis`). scale: metres of its unit.
     allow_missing: leave out what needs a missing file. allow_outside: read files outside the scene's folder. cameras:
@@ -124,7 +124,7 @@ class ImportedScene:
                 raise SceneFileError(refusal(problem, places, self.tree.file, scratch)) from None
 
     def _check_corners(self, loaded: Any) -> None:
-        """What `mesh_files` has no check for, before a ray meets it."""
+        """Check of shapes that `mesh_files` does not cover, before a ray meets them."""
         for shape in loaded.shapes():
             if not shape.is_mesh() or shape.face_count() == 0:
                 continue
@@ -217,7 +217,7 @@ def _settled_settings(root: Node) -> tuple[tuple[int, int], int]:
 
 
 def scene_title(file: Path) -> str:
-    """What to call a scene: by its folder where the file is called scene.xml, else by the file."""
+    """Name of a scene: its folder where the file is called scene.xml, else by the file."""
     return file.resolve().parent.name if file.stem == "scene" else file.stem
 
 

@@ -1,4 +1,4 @@
-"""Which plugins Mitsuba ships, so that an unknown one is named with its place before anything is loaded."""
+"""The plugins that Mitsuba ships, so that an unknown one is named with its place before anything is loaded."""
 
 from __future__ import annotations
 

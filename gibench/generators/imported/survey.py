@@ -30,7 +30,7 @@ EYES = (HEIGHTS[0], sum(HEIGHTS) / 2, HEIGHTS[1])
 """Heights above the floor at which a place must be free, m."""
 
 STEP = 0.25
-"""What one may stand on, a rug or a step, is at most so high, m."""
+"""Height of a rug or a step that one may stand on, m."""
 
 LEAST_FREE = 0.5
 """Free floor in one piece below which no camera is put there, m²."""

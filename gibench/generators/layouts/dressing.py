@@ -1,4 +1,4 @@
-"""What every kind of room gets at the end: curtains, pictures, mirrors, plants, lamps, and things on surfaces."""
+"""Things that all rooms get at the end: curtains, pictures, mirrors, plants, lamps, and things on surfaces."""
 
 from __future__ import annotations
 

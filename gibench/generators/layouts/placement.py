@@ -207,7 +207,7 @@ class Plan:
         self.placed[self.placed.index(thing)] = replace(thing, furniture=furniture)
 
     def of(self, *families: str) -> list[Placed]:
-        """What has been placed of those families."""
+        """Things of those families that have been placed."""
         return [p for p in self.placed if p.furniture.family in families]
 
     def _fits(self, furniture: Furniture, boxes: FloatArray, margin: float, on: Placed | None) -> bool:
@@ -241,7 +241,7 @@ class Plan:
         return bool(solid) and bool(overlap(zone, np.concatenate(solid)).any())
 
     def free_floor(self, width: float = WALKWAY) -> shapely.Geometry:
-        """Where the middle of someone `width` metres wide can stand, having come in through the door.
+        """Floor that the middle of someone `width` metres wide can stand, having come in through the door.
 
         A polygon, or an empty geometry if the door is blocked.
         """

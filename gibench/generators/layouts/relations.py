@@ -1,4 +1,4 @@
-"""How things stand to each other: against a wall, in a corner, facing, beside, around, on top, hanging.
+"""Relations between things: against a wall, in a corner, facing, beside, around, on top, hanging.
 
 Each relation draws poses from the plan's lane and returns what was placed, or None where nothing fitted.
 """
@@ -251,7 +251,7 @@ def wall_behind(plan: Plan, thing: Placed) -> Wall | None:
 
 
 def along_wall(wall: Wall, thing: Placed) -> float:
-    """How far along a wall the middle of a piece is, metres."""
+    """Distance of the middle of a piece along its wall, metres."""
     return float(np.dot(np.subtract(thing.position[:2], wall.start), wall.along))
 
 

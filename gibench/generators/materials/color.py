@@ -112,7 +112,7 @@ def colorize(index: NDArray[np.integer], palette: ArrayLike, luminance: float) -
 
 
 def _scale(shades: FloatArray, weights: FloatArray, luminance: float) -> float:
-    """What to multiply luminances (K,) with, so that, clipped, they have a given mean under weights that sum to 1."""
+    """Factor for luminances (K,) that gives them, once clipped, a given mean under weights that sum to 1."""
     used = weights > 0
     shades, weights = shades[used], weights[used]
     scale = luminance / max(float(weights @ shades), 1e-9)

@@ -1,4 +1,4 @@
-"""What can be wrong with a request for a material."""
+"""Errors of requests for materials."""
 
 from gibench.errors import GibenchError
 

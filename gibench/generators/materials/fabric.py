@@ -77,7 +77,7 @@ def fabric(
 
 
 def _warp_on_top(weave: str, i: NDArray[np.integer], j: NDArray[np.integer]) -> NDArray[np.bool_]:
-    """Where the warp (along v) covers the weft, for warp thread i and weft thread j."""
+    """Mask of the places where the warp (along v) covers the weft, for warp thread i and weft thread j."""
     if weave == "plain":
         return (i + j) % 2 == 0
     if weave == "twill":
@@ -87,7 +87,7 @@ def _warp_on_top(weave: str, i: NDArray[np.integer], j: NDArray[np.integer]) -> 
 
 
 def _dyed(rng: np.random.Generator, dye: str) -> NDArray[np.bool_]:
-    """Which of the threads are of the second yarn."""
+    """Mask of the threads that are of the second yarn."""
     if dye == "plain":
         return np.zeros(_THREADS, np.bool_)
     if dye == "melange":

@@ -12,7 +12,7 @@ from gibench.generators.materials.noise import Map, band_noise, smoothstep
 
 
 class Species(NamedTuple):
-    """What tells one wood from another.
+    """The figure of a wood.
 
     luminance: of a usual oiled board. chroma, hue: Oklab. late: luminance of the dark late wood relative to
     the early wood. pores: how strongly they show, in [0, 1].

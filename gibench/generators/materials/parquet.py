@@ -80,7 +80,7 @@ Layout = tuple[NDArray[np.bool_], NDArray[np.int32], NDArray[np.floating], NDArr
 
 
 def _herringbone(u: NDArray[np.floating], v: NDArray[np.floating], ratio: int) -> Layout:
-    """Where a texel lies in its block: upright, block number, position along and across, in block widths.
+    """Position of a texel in its block: upright, block number, position along and across, in block widths.
 
     In row j, a lying block covers the cells i with (i − j) mod 2·ratio < ratio; the others belong to blocks
     that stand in column i. The pattern repeats after 2·ratio cells both ways. u and v broadcast.

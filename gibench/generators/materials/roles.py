@@ -1,4 +1,4 @@
-"""What a slot asks of the material that fills it."""
+"""Bounds that a slot sets for the material that fills it."""
 
 from __future__ import annotations
 

@@ -54,7 +54,7 @@ def rug(
 
 
 def _place(pattern: str, u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Where a texel lies between the middle (0) and the border (1) of its motif, (H, W) or broadcastable."""
+    """Position of a texel between the middle (0) and the border (1) of its motif, (H, W) or broadcastable."""
     x, y = np.abs(2 * (u % 1) - 1), np.abs(2 * (v % 1) - 1)
     if pattern == "stripes":
         return np.broadcast_to(x, np.broadcast_shapes(u.shape, v.shape))

@@ -1,4 +1,4 @@
-"""Which materials may fill which slot, and `sample_material`, which picks one."""
+"""The materials that may fill each slot, and `sample_material`, which picks one."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MIRROR_LIKE = (0.005, GLOSSY_ALPHA)
 
 @dataclass(frozen=True)
 class SlotRule:
-    """What may fill a slot.
+    """The materials that may fill a slot.
 
     families: family → weight. rooms: room kind → weights that replace them there. luminance: range of the
     mean diffuse reflectance. alpha: range of GGX roughness, log-uniform; `MATT` for diffuse. family_alpha:

@@ -95,7 +95,7 @@ def _figure(
     column: np.ndarray[Any, Any],
     shape: tuple[int, int],
 ) -> Map:
-    """What the pattern adds to the tone, (H, W), before clipping to [0, 1]."""
+    """Offset of the tone by the pattern, (H, W), before clipping to [0, 1]."""
     if pattern == "chequer":
         return np.where((row + column) % 2, 0.35, -0.45).astype(np.float32) + 0.02 * band_noise(
             rng, shape, (40, 40)

@@ -18,7 +18,7 @@ Extents = tuple[float, float, float, float, float, float]
 
 @lru_cache(maxsize=2)
 def _box_template(bevelled: bool) -> tuple[FloatArray, NDArray[np.bool_], FloatArray, FloatArray, IntArray]:
-    """What is the same for every box with or without bevelled edges.
+    """Topology of all boxes, with or without bevelled edges.
 
     Returns signs (96, 3) of the half-sizes, faces' normals (96, 3) (whose non-zero axis is the one that is
     not drawn in by the bevel), the UV frames (3 grains, 96, 3, 2) and the triangles (44, 3).

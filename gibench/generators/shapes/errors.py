@@ -1,4 +1,4 @@
-"""What goes wrong when a shape is asked for."""
+"""Errors of shapes."""
 
 from gibench.errors import GibenchError
 

@@ -30,7 +30,7 @@ COUNT = (4, 9)
 """Things, the ring included."""
 
 REACH = (0.22, 0.34)
-"""How far from the middle things stand, m."""
+"""Distance of things from the middle, m."""
 
 GAP = 0.015
 """Least distance between two things, m."""

@@ -1,4 +1,4 @@
-"""What a still life is made of: a ring, animals, bodies of geometry, and vessels from the furniture."""
+"""Things of a still life: a ring, animals, bodies of geometry, and vessels from the furniture."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ from gibench.rendering.light_sampling import inverse
 
 @dataclass(frozen=True)
 class Distributions:
-    """What is learned. Row 0 stands for all places of which nothing is known.
+    """The learned distributions. Row 0 stands for all places of which nothing is known.
 
     rows: (places,) uint32, the row of each place of the grid. lights: (E, L) over the lights, and the portals as one
     more. directions: (E, BINS), relative. fraction: (E,) of directions that the guide chooses, in [0, 1); the BSDF

@@ -30,7 +30,7 @@ LANES = 1 << 18
 """Paths at a time."""
 
 PASSES = (1, 2, 4)
-"""How many times LANES paths a pass has."""
+"""Paths of a pass, as a multiple of LANES."""
 
 DEPTH = 8
 """Scattering events of the paths."""

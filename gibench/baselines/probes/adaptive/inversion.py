@@ -15,7 +15,7 @@ TRIANGLES = (((0, 0), (0, 1), (1, 0)), ((1, 1), (1, 0), (0, 1)))
 
 
 def inverse_map(corners: NDArray[np.floating], points: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Where points come from, (P, 2) as x and y in cells.
+    """Inverse images of points, (P, 2) as x and y in cells.
 
     corners: (H + 1, W + 1, 2), to where the corners of the grid have moved, in cells, no cell flipped. points: (h, w,
     2) on a lattice: x = points[0, :, 0], evenly spaced and the same in every row, y likewise in every column. Returns

@@ -15,7 +15,7 @@ GUIDES = (256, 128)
 """Width and height of the maps that decide, section 4.2.1."""
 
 GUIDE_MAPS = ("distance", "normal", "roughness")
-"""What they are of; names in `baking.MAPS`."""
+"""Maps that they are made of; names in `baking.MAPS`."""
 
 CELLS = (128, 64)
 """Columns and rows of the mesh that is moved. The paper has a quad a texel of the guides; what they say is blurred over

@@ -34,7 +34,7 @@ RANGE = 1e4
 
 
 def forward_map(wanted: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Where the corners of a grid's cells move, (H + 1, W + 1, 2) as x and y in cells.
+    """New positions of the corners of a grid's cells, (H + 1, W + 1, 2) as x and y in cells.
 
     wanted: (H, W) > 0, relative room of the cells. The first and last column are the same line on the sphere: they
     keep their x and have equal y. The first and last row keep their y.

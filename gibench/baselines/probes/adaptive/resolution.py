@@ -1,4 +1,4 @@
-"""How many texels each direction from a probe needs, relative to the others (Rodriguez et al. 2020, section 4.2.1)."""
+"""Resolution that each direction from a probe needs, relative to the others (Rodriguez et al. 2020, section 4.2.1)."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def resolution_map(
 
 
 def complexity(normal: NDArray[np.floating]) -> NDArray[np.float64]:
-    """How much normals vary around each texel, (H, W) ≥ 0, relative: high frequencies of a cosine transform count most.
+    """Variation of normals around each texel, (H, W) ≥ 0, relative: high frequencies of a cosine transform count most.
 
     normal: (H, W, 3) unit, 0 on a miss, of a lat-long map; where they are alike it is exactly 0. The map goes on over
     its left and right edge; beyond its top and bottom it repeats the last row. A neighbourhood is as large at a pole

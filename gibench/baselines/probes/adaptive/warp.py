@@ -39,7 +39,7 @@ class _Grids:
 
 
 class Warp:
-    """Where the texels of adaptive probes look.
+    """Directions of the texels of adaptive probes.
 
     Coordinates are in texels of maps of `size`: plain ones are those of the lat-long map, moved ones those of a
     probe's own. Both run over the same rectangle. arrays: what a `Replay` must hold.

@@ -56,5 +56,5 @@ def judging(of_true: Tensor, of_made: Tensor) -> Tensor:
 
 
 def fooling(of_made: Tensor) -> Tensor:
-    """What the generator is trained for: that its images are taken for true ones."""
+    """Loss of the generator: that its images are taken for true ones."""
     return softplus(-of_made).mean()

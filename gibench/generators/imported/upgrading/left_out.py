@@ -1,4 +1,4 @@
-"""What gibench has none of, or decides itself: media, integrators, films."""
+"""Plugins that gibench has none of, or decides itself: media, integrators, films."""
 
 from __future__ import annotations
 

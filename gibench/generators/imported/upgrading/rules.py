@@ -1,4 +1,4 @@
-"""What a rule is, and what rules are written with."""
+"""Rules, and the helpers that they are written with."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the sun stands, in the axes of Mitsuba 0.6: x is east, y up, z south.
+"""Direction to the sun, in the axes of Mitsuba 0.6: x is east, y up, z south.
 
 Source: M. Blanco-Muriel et al., Computing the solar vector, Solar Energy 70(5), 2001 (the PSA algorithm, which is good
 to half a minute of arc until 2015).

@@ -20,7 +20,7 @@ from gibench.generators.imported.upgrading.rules import (
 
 
 def conductors(root: Node, note: Note) -> None:
-    """What is outside of a metal (extEta) is folded into its own index of refraction."""
+    """The medium outside of a metal (extEta) is folded into its own index of refraction."""
     for node in plugins(root, "bsdf", "conductor", "roughconductor"):
         outside = node.property("ext_eta")
         if outside is None:
