@@ -1,8 +1,8 @@
 """Choice of the Mitsuba variant, and of the LLVM library that its CPU backend compiles with.
 
-Dr.Jit loads LLVM at run time and aborts the process with versions before 19, which Linux distributions still
-install. The library therefore comes from the PyPI package `karellen-llvm-core` (see `gibench.llvm`), unless the user has
-set DRJIT_LIBLLVM_PATH, which wins.
+Dr.Jit loads LLVM when it is imported and aborts the process with versions before 19, which Linux distributions still
+install. The library therefore comes from the PyPI package `karellen-llvm-core`, which `gibench.llvm` names, unless the
+user has set DRJIT_LIBLLVM_PATH, which wins.
 """
 
 from __future__ import annotations

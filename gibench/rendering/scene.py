@@ -23,7 +23,7 @@ OPENINGS = "openings.json"
 PLAIN, GUIDED = "plain", "guided"
 
 SAMPLINGS = (PLAIN, GUIDED)
-"""Choice of lights and directions by paths: from the materials alone, or also from what is learned of the room first. The
+"""Choice of lights and directions: from the materials alone, or also from what is learned of the room first. The
 means are the same; a guide costs some seconds a scene and then about halves the samples that a frame needs."""
 
 

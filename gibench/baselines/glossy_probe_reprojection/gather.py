@@ -206,7 +206,8 @@ class Table:
 class Search:
     """Options of a search, each of one lane.
 
-    order: mi.UInt32, of the perturbation. window: mi.UInt32, samples along a side of the coarse grid. levels: mi.UInt32, 1 without the fine grid. unit: mi.Float, metres of equation 1.
+    order: mi.UInt32, of the perturbation. window: mi.UInt32, samples along a side of the coarse grid.
+    levels: mi.UInt32, 1 without the fine grid. unit: mi.Float, metres of equation 1.
     """
 
     order: Any
