@@ -158,6 +158,19 @@ class RayGenerator:
         if not is_scalar():
             dr.make_opaque(self.origin, self.axes, self.scale, self.centre)
 
+    @classmethod
+    def of(cls, arrays: dict[str, Any]) -> RayGenerator:
+        """The generator whose `arrays` these are."""
+        generator = object.__new__(cls)
+        generator.origin, generator.axes = arrays["origin"], arrays["axes"]
+        generator.scale, generator.centre = arrays["scale"], arrays["centre"]
+        return generator
+
+    @property
+    def arrays(self) -> dict[str, Any]:
+        """What `of` makes it from again; see `replay.HoldsArrays`."""
+        return {"origin": self.origin, "axes": self.axes, "scale": self.scale, "centre": self.centre}
+
     @property
     def forward(self) -> Any:
         """Unit vector along the optical axis."""

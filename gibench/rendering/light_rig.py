@@ -53,6 +53,11 @@ class Lights:
         self.placed = mi.Float(1.0 if lighting.area else 0.0)
         _keep_out(self.centre, self.placed)
 
+    @property
+    def arrays(self) -> dict[str, Any]:
+        """What kernels read; see `replay.HoldsArrays`."""
+        return {"centre": self.centre, "placed": self.placed}
+
 
 @dataclass
 class _Lamp:

@@ -65,6 +65,17 @@ class Portals:
         self.fraction = mi.Float(PORTAL_FRACTION if bright and self._any else 0.0)
         dr.make_opaque(self.fraction)
 
+    @property
+    def arrays(self) -> dict[str, Any]:
+        """What kernels read; see `replay.HoldsArrays`."""
+        return {
+            "count": self._count,
+            "inverse_area": self._inverse_area,
+            "environment": self.environment,
+            "table": self._table,
+            "fraction": self.fraction,
+        }
+
     def _row(self, portal, column):
         offset = portal * _COLUMNS + column
         return mi.Vector3f(*(dr.gather(mi.Float, self._table, offset + i) for i in range(3)))

@@ -10,13 +10,14 @@ it was when the recording was made.
 from __future__ import annotations
 
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from functools import cache, partial
-from typing import Any
+from typing import Any, Protocol
 
 import drjit as dr
 import mitsuba as mi
 
+from gibench.errors import GibenchError
 from gibench.rendering.backend import tracing
 from gibench.rendering.camera import PinholeCamera, RayGenerator
 from gibench.rendering.scene import Scene
@@ -46,11 +47,13 @@ class Replay:
 
         held: arrays, or pytrees of them, that it reads besides and that stay as they are.
         """
-        guide = [] if scene.guide is None else scene.guide.arrays
+        guide = [] if scene.guide is None else arrays_of(scene.guide)
         kinds = _kinds(str(mi.variant()))
         self._held = [scene.mi_scene, scene.tables, scene.layers.arrays, guide, kinds, held]
         # Their arrays are others after a change of the light.
         self._changing = [thing for thing in (scene.portals, scene.lights) if thing is not None]
+        for thing in self._changing:
+            arrays_of(thing)
         self._function = function
         me = weakref.ref(self)  # `dr.freeze` makes cycles of its own, which would hold the scene
 
@@ -70,24 +73,57 @@ class Replay:
     def __call__(self, *arguments: Any) -> Any:
         """Call the function."""
         with tracing():
-            return self._frozen([*self._held, *map(arrays_of, self._changing)], arguments)
+            return self._frozen([*self._held, *(thing.arrays for thing in self._changing)], arguments)
 
 
-def arrays_of(thing: Any) -> dict[str, Any]:
-    """The Dr.Jit arrays among the attributes of an object, by name, for a `Replay` to hold."""
-    return {name: value for name, value in vars(thing).items() if dr.is_array_v(value)}
+class ReplayError(GibenchError):
+    """A thing whose arrays a recording would miss."""
+
+
+class HoldsArrays(Protocol):
+    """A thing that kernels read. It declares what it holds, since a recording bakes in what it is not shown."""
+
+    @property
+    def arrays(self) -> Any:
+        """Its Dr.Jit arrays now, a pytree of lists and dictionaries."""
+
+
+def arrays_of(thing: HoldsArrays) -> Any:
+    """`thing.arrays`, for a `Replay` to hold.
+
+    Raises ReplayError where an attribute holds an array, however deep, that is not among them.
+    """
+    declared = {id(array) for _, array in _leaves(thing.arrays, "")}
+    for name, value in vars(thing).items():
+        for place, array in _leaves(value, name):
+            if id(array) not in declared:
+                raise ReplayError(
+                    f"{type(thing).__name__}.{place} is an array that `arrays` leaves out: a recording would keep the "
+                    "value that it has now"
+                )
+    return thing.arrays
+
+
+def _leaves(value: Any, place: str) -> Iterator[tuple[str, Any]]:
+    """The Dr.Jit arrays in lists and dictionaries, with their places. Other things declare theirs themselves."""
+    if dr.is_array_v(value):
+        yield place, value
+    elif isinstance(value, Mapping):
+        for key, one in value.items():
+            yield from _leaves(one, f"{place}[{key!r}]")
+    elif isinstance(value, list | tuple):
+        for number, one in enumerate(value):
+            yield from _leaves(one, f"{place}[{number}]")
 
 
 def camera_arrays(camera: PinholeCamera, resolution: tuple[int, int]) -> dict[str, Any]:
     """The arrays that a frame's rays depend on, as an argument of a `Replay`."""
-    return vars(RayGenerator(camera, resolution))
+    return RayGenerator(camera, resolution).arrays
 
 
 def ray_generator(arrays: dict[str, Any]) -> RayGenerator:
-    """The generator that `camera_arrays` took apart."""
-    generator = object.__new__(RayGenerator)
-    vars(generator).update(arrays)
-    return generator
+    """The generator whose `arrays` these are."""
+    return RayGenerator.of(arrays)
 
 
 def replayed(scene: Scene, name: Any, function: Callable[..., Any], *held: Any) -> Replay:

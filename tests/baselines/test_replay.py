@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import weakref
+from dataclasses import replace
 from functools import partial
 
 import drjit as dr
@@ -11,8 +12,9 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from gibench.baselines.replay import Replay, arrays_of, camera_arrays, ray_generator
+from gibench.baselines.replay import Replay, ReplayError, arrays_of, camera_arrays, ray_generator
 from gibench.rendering.camera import PinholeCamera, RayGenerator
+from gibench.rendering.light_rig import LightRig
 from gibench.rendering.scene import load_dict
 from tests.rendering import scenes
 
@@ -60,10 +62,10 @@ def test_what_is_held_may_be_read():
         def __init__(self):
             self.table = mi.Float([10, 20, 30])
             self.name = "not an array"
+            self.arrays = {"table": self.table}
             dr.make_opaque(self.table)
 
     thing = Thing()
-    assert set(arrays_of(thing)) == {"table"}
     replay = Replay(
         load_dict(scenes.box("coat")),
         lambda index: dr.gather(mi.Float, thing.table, index),
@@ -107,3 +109,41 @@ def test_after_a_failure_others_work():
     np.testing.assert_array_equal(
         np.array(found[0]), np.array(seen(scene, RayGenerator(CAMERAS[1], SIZE))[0])
     )
+
+
+class Declaring:
+    """A table in rows, which a look at the attributes alone would miss."""
+
+    def __init__(self, declare=True):
+        self.rows = [{"values": mi.Float([10, 20, 30])}]
+        self.declare = declare
+        dr.make_opaque(self.rows)
+
+    @property
+    def arrays(self):
+        return self.rows if self.declare else []
+
+
+def test_nested_arrays_that_change_are_no_part_of_the_recording():
+    thing, scene = Declaring(), load_dict(scenes.box("coat"))
+    replay = Replay(scene, lambda index: dr.gather(mi.Float, thing.rows[0]["values"], index))
+    replay._changing.append(thing)
+    for factor in (1, 2, 3):
+        thing.rows = [{"values": mi.Float(np.multiply([10, 20, 30], factor))}]
+        dr.make_opaque(thing.rows)
+        np.testing.assert_array_equal(np.array(replay(mi.UInt32([2, 0]))), np.multiply([30, 10], factor))
+    assert replay.recordings == 1
+
+
+def test_an_array_that_is_left_out_is_an_error_with_its_place():
+    with pytest.raises(ReplayError, match=r"Declaring\.rows\[0\]\['values'\].*keep the value"):
+        arrays_of(Declaring(declare=False))
+
+
+def test_what_a_scene_shows_is_complete():
+    openings = np.array([[[0.0, 0, 2], [1, 0, 0], [0, 1, 0]]])
+    description = scenes.box("coat") | {"sky": {"type": "constant"}}
+    scene = replace(load_dict(description), openings=openings)
+    rig = LightRig(scene)
+    for thing in (rig.scene.portals, rig.scene.lights, RayGenerator(CAMERAS[0], SIZE)):
+        assert arrays_of(thing)

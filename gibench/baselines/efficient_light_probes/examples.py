@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from torch import Tensor
 from gibench.baselines.efficient_light_probes.temporal import DECAY
 from gibench.baselines.method import MethodError, Site
 from gibench.baselines.stages import Stages
+from gibench.baselines.training.crops import Window
 from gibench.datasets.loading import Frame
 from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.gbuffer import render_gbuffer
@@ -48,6 +49,10 @@ class Example:
     guides_before: Tensor
     motion: Tensor
     valid: Tensor
+
+    def cropped(self, window: Window) -> Example:
+        """The same of a window of the image."""
+        return Example(**{field.name: window.of(getattr(self, field.name)) for field in fields(self)})
 
 
 def cameras_before(

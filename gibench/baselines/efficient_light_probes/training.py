@@ -230,19 +230,22 @@ class Reconstructing(Learner):
     def _loss(self, batch: Crops) -> Tensor:
         scale, count = self.scale, len(batch.examples)
         crops = [
-            [window.of(part) for part in vars(example).values()]
-            for example, window in zip(batch.examples, batch.windows, strict=True)
+            example.cropped(window) for example, window in zip(batch.examples, batch.windows, strict=True)
         ]
-        parts = [torch.stack(part).to(self.device) for part in zip(*crops, strict=True)]
-        color, guides, truth, before, guides_before, motion, valid = parts
+
+        def stacked(name: str) -> Tensor:
+            return torch.stack([getattr(crop, name) for crop in crops]).to(self.device)
+
+        color, guides, truth = stacked("color"), stacked("guides"), stacked("truth")
         image, buffers = scale.compressed(color), scale.guides(guides)
         if self.plan.temporal:
-            image = torch.cat([image, scale.compressed(before)])
-            buffers = torch.cat([buffers, scale.guides(guides_before)])
+            image = torch.cat([image, scale.compressed(stacked("before"))])
+            buffers = torch.cat([buffers, scale.guides(stacked("guides_before"))])
         outputs = self.network(image, buffers).split(count)
         output = outputs[0]
         loss = losses.ABSOLUTE * absolute(output, scale.compressed(truth))
         if self.plan.temporal:
+            motion, valid = stacked("motion"), stacked("valid")
             loss = loss + losses.TEMPORAL * losses.temporal(output, outputs[1], motion, valid)
         if self.lpips_network is not None and batch.perceptual is not None:
             part, known = (batch.perceptual.of(image[:1]) for image in (output, truth))

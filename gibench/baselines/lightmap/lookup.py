@@ -48,7 +48,14 @@ class Lightmap:
         self._offsets = mi.UInt32(offsets)
         self._last = mi.Point2i(width - 1, height - 1)
         self._width = mi.UInt32(width)
-        dr.make_opaque(self._texels, self._corners, self._offsets, self._last, self._width)
+        self.arrays = {
+            "texels": self._texels,
+            "corners": self._corners,
+            "offsets": self._offsets,
+            "last": self._last,
+            "width": self._width,
+        }
+        dr.make_opaque(self.arrays)
 
     def diffuse(self, si: Any, preliminary: Any, active: Any = True) -> Any:
         """Diffuse radiance that leaves hits towards si.wi, mi.Color3f in W·m⁻²·sr⁻¹; 0 where there is none.

@@ -3,21 +3,20 @@
 # mypy: disable-error-code="no-untyped-def, misc"
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any
+from typing import Any, ClassVar
 
 import drjit as dr
 import mitsuba as mi
 
 from gibench.baselines.first_hits import averaged, hits_of_rays
-from gibench.baselines.lightmap.bake import baked_lightmap
+from gibench.baselines.lightmap.deferred import OnLightmap
 from gibench.baselines.lightmap.lookup import Lightmap
 from gibench.baselines.method import Prediction, Setting, Site, View
 from gibench.baselines.probes.baking import ProbeSettings
 from gibench.baselines.probes.maps import Probes, load_probes
-from gibench.baselines.replay import Replay, arrays_of, camera_arrays, ray_generator
+from gibench.baselines.replay import Replay, camera_arrays, ray_generator
 from gibench.baselines.stages import Stages
 from gibench.rendering.scene import Scene
 
@@ -34,12 +33,13 @@ def surfaces_seen(scene: Scene, lightmap: Lightmap, camera, width: int, height: 
     return found
 
 
-class ProbeLookup:
+class ProbeLookup(OnLightmap):
     """A method whose glossy light is a function of the point that is seen, the camera's position and the probes.
 
     A subclass names the maps it reads and gives `glossy`.
     """
 
+    functions: ClassVar = {"g-buffer": surfaces_seen}
     maps: tuple[str, ...] = ("radiance",)
 
     @staticmethod
@@ -47,34 +47,24 @@ class ProbeLookup:
         """Glossy radiance, mi.Color3f, that leaves points (mi.Point3f) for the camera (mi.Point3f of one lane)."""
         raise NotImplementedError
 
-    def __init__(self, settings: Mapping[str, Setting]) -> None:
-        """settings: all knobs of the method."""
-        self.adjust(settings)
-
-    def adjust(self, settings: Mapping[str, Setting]) -> None:
-        """Take other settings that do not bake."""
-        self._settings = dict(settings)
-        self._grid = math.isqrt(int(settings["rays"]))
-
     def prepare(self, site: Site) -> None:
         """Bake the lightmap and the probes, or find them."""
-        lightmap = baked_lightmap(site, self._settings)
-        probes = load_probes(site, ProbeSettings.of(self._settings), self.maps)
-        self._surfaces = Replay(site.scene, partial(surfaces_seen, site.scene, lightmap), arrays_of(lightmap))
-        self._gather = Replay(site.scene, partial(_looked_up, self.glossy, probes), probes.arrays)
+        super().prepare(site)
+        probes = load_probes(site, ProbeSettings.of(self.settings), self.maps)
+        self.kernels["gather"] = Replay(site.scene, partial(_looked_up, self.glossy, probes), probes.arrays)
 
     def render(self, view: View, stages: Stages) -> Prediction:
         """Emission and diffuse light at the first hits, then the glossy light from the probes."""
-        fine = (view.resolution[0] * self._grid, view.resolution[1] * self._grid)
+        fine = self.fine(view)
         camera = camera_arrays(view.camera, fine)
         with stages.stage("g-buffer"):
-            point, glossy, matte = self._surfaces(camera, *fine)
+            point, glossy, matte = self.kernels["g-buffer"](camera, *fine)
         with stages.stage("gather"):
             position = mi.Point3f(list(view.camera.position))
             dr.make_opaque(position)
-            found = self._gather(point, glossy, position, tuple(self._settings.items()))
-            specular = averaged(found, fine, self._grid)
-            return Prediction(averaged(matte, fine, self._grid) + specular, specular)
+            found = self.kernels["gather"](point, glossy, position, tuple(self.settings.items()))
+            specular = averaged(found, fine, self.grid)
+            return Prediction(averaged(matte, fine, self.grid) + specular, specular)
 
 
 def _looked_up(lookup: Callable[..., Any], probes: Probes, point, glossy, camera, settings) -> Any:

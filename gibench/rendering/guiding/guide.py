@@ -68,7 +68,19 @@ class Guide:
         self._light_probability = mi.Float(light_probability.ravel())
         self._table = mi.UInt32(table.ravel())
         self._density = mi.Float(probability.ravel() * (BINS / (4 * np.pi)))
-        self.arrays = [value for value in vars(self).values() if dr.is_array_v(value)] + grid.arrays
+        self.arrays = [
+            self._emitters,
+            self._numbers,
+            self._lights,
+            self._portal_light,
+            self._rows,
+            self._fraction,
+            self._light_table,
+            self._light_probability,
+            self._table,
+            self._density,
+            *grid.arrays,
+        ]
         dr.make_opaque(self.arrays)
 
     def row(self, si, sampler, active):
