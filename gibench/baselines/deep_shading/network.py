@@ -2,7 +2,7 @@
 
 Six halvings by the maximum, 3 × 3 convolutions; back up by transposed convolutions that keep the channels, joined with
 what was found at that size, and a convolution that halves them. Gai, Wang & Li compare themselves with the version that
-has a network of its own for every colour. They report 7.75 M parameters; three of these have 7.74 M.
+has a network of its own for every colour. They report 7.75 M parameters; three of these have 7.73 M.
 """
 
 from __future__ import annotations
@@ -22,35 +22,37 @@ SLOPE = 0.01
 DROPOUT, DROPPED = 0.5, 2
 """Share of features that is dropped while training, and in how many of the deepest levels on each side."""
 
-MULTIPLE = 2 ** len(CHANNELS)
-"""Pixels that a side must be a multiple of; others are padded."""
-
 
 class DeepShading(nn.Module):
     """One network. 2.58 M parameters."""
 
-    def __init__(self, inputs: int, outputs: int = 1) -> None:
-        """inputs, outputs: channels."""
+    def __init__(self, inputs: int, outputs: int = 1, channels: tuple[int, ...] = CHANNELS) -> None:
+        """inputs, outputs: channels. channels: of the levels; a halving of the image each."""
         super().__init__()
-        before = (inputs, *CHANNELS[:-1])
+        before = (inputs, *channels[:-1])
         self.down = nn.ModuleList(
-            nn.Conv2d(one, other, 3, padding=1) for one, other in zip(before, CHANNELS, strict=True)
+            nn.Conv2d(one, other, 3, padding=1) for one, other in zip(before, channels, strict=True)
         )
-        rising = CHANNELS[::-1]
+        rising = channels[::-1]
         self.up = nn.ModuleList(nn.ConvTranspose2d(count, count, 4, 2, padding=1) for count in rising)
         after = (*rising[1:], outputs)
         self.mix = nn.ModuleList(
             nn.Conv2d(2 * one, other, 3, padding=1) for one, other in zip(rising, after, strict=True)
         )
 
+    @property
+    def multiple(self) -> int:
+        """Pixels that a side must be a multiple of; others are padded."""
+        return int(2 ** len(self.down))
+
     def forward(self, image: Tensor) -> Tensor:
         """(N, inputs, H, W) of any size to (N, outputs, H, W)."""
         height, width = image.shape[-2:]
-        features = padded(image, MULTIPLE)
+        features = padded(image, self.multiple)
         skips: list[Tensor] = []
         for level, down in enumerate(self.down):
             features = leaky_relu(down(features), SLOPE)
-            if level >= len(CHANNELS) - DROPPED:
+            if level >= len(self.down) - DROPPED:
                 features = dropout(features, DROPOUT, self.training)
             skips.append(features)
             features = max_pool2d(features, 2)
@@ -66,10 +68,10 @@ class DeepShading(nn.Module):
 class OfEachColour(nn.Module):
     """Three networks, none of which sees another's colour."""
 
-    def __init__(self, light: int, geometry: int) -> None:
-        """light: channels of each colour, geometry: of what all three see."""
+    def __init__(self, light: int, geometry: int, channels: tuple[int, ...] = CHANNELS) -> None:
+        """light: channels of each colour, geometry: of what all three see. channels: of the levels."""
         super().__init__()
-        self.colours = nn.ModuleList(DeepShading(light + geometry) for _ in range(3))
+        self.colours = nn.ModuleList(DeepShading(light + geometry, 1, channels) for _ in range(3))
 
     def forward(self, light: Tensor, geometry: Tensor) -> Tensor:
         """(N, light, 3, H, W) and (N, geometry, H, W) to (N, 3, H, W)."""

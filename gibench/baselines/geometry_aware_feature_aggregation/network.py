@@ -13,6 +13,7 @@ The paper gives numbers of parameters and no channels: those here are ours, and 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -28,6 +29,10 @@ SLOPE = 0.2
 
 DROPOUT = 0.1
 """Share of features that is dropped where the generator goes up. The paper drops some and does not say how many."""
+
+LARGEST = 1 << 25
+"""Numbers of an attention that exist at a time, but for those that a gradient needs: 128 MB.
+"""
 
 MODULATED = 3
 """Pixels along a side of the convolutions that make scales and shifts."""
@@ -85,15 +90,19 @@ class Attention(nn.Module):
         self.queries, self.keys = (nn.Conv2d(geometry + GEOMETRY, heads * query, 1) for _ in "QK")
         _xavier(self.queries, self.keys)
 
-    def forward(self, features: Tensor, inputs: Tensor) -> Tensor:
-        """(N, heads, P, P) for P places, each row of which adds up to 1."""
+    def forward(self, features: Tensor, inputs: Tensor) -> Iterator[Tensor]:
+        """(N, heads, P, P) for P places, each row of which adds up to 1: blocks of rows, one after the other.
+
+        A block holds LARGEST numbers at most, so that memory grows with the places and not with their square.
+        """
         both = torch.cat([features, inputs], dim=1)
         queries, keys = (
             part(both).flatten(2).unflatten(1, (self.heads, -1)) for part in (self.queries, self.keys)
         )
-        # The paper has no factor; without one the first products saturate the exponentials.
-        scores = queries.transpose(2, 3) @ keys / math.sqrt(queries.shape[2])
-        return softmax(scores, dim=-1)
+        for some in queries.split(max(1, LARGEST // (len(keys) * self.heads * keys.shape[-1])), dim=-1):
+            # The paper has no factor; without one the first products saturate the exponentials.
+            scores = some.transpose(2, 3) @ keys / math.sqrt(keys.shape[2])
+            yield softmax(scores, dim=-1)
 
 
 class Aggregation(nn.Module):
@@ -109,12 +118,12 @@ class Aggregation(nn.Module):
         _xavier(self.values)
         self.heads = heads
 
-    def forward(self, features: Tensor, attention: Tensor) -> Tensor:
-        """features (N, colours, C, h, w), attention (N, heads, P, P)."""
-        count, colours, channels, height, width = features.shape
+    def forward(self, features: Tensor, attention: Iterable[Tensor]) -> Tensor:
+        """features (N, colours, C, h, w), attention (N, heads, P, P) in blocks of rows."""
+        count, colours, _, height, width = features.shape
         values = self.values(features.flatten(0, 1)).reshape(count, colours, self.heads, -1, height * width)
-        gathered = values @ attention.transpose(2, 3)[:, None]
-        return features + gathered.reshape(count, colours, channels, height, width)
+        gathered = torch.cat([values @ rows.transpose(2, 3)[:, None] for rows in attention], dim=-1)
+        return features + gathered.reshape(features.shape)
 
 
 class GeometryEncoder(nn.Module):

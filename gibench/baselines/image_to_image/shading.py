@@ -78,7 +78,11 @@ class Inputs:
 
     def radiance(self, code: Tensor) -> Tensor:
         """What a network says, (N, 3, H, W), as indirect diffuse radiance: finite and ≥ 0."""
-        return remodulated(OUTPUT.decode(code) * self.unit, self.albedo)
+        return self.radiance_of(OUTPUT.decode(code))
+
+    def radiance_of(self, light: Tensor) -> Tensor:
+        """Indirect light over albedo, in units of the mean direct light, as radiance."""
+        return remodulated(light * self.unit, self.albedo)
 
 
 def indirect(network: nn.Module, direct: Tensor, albedo: Tensor, geometry: Tensor) -> Tensor:

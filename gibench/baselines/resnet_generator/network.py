@@ -6,6 +6,7 @@ borders mirrored and instances normalised. The last layer has no activation: it 
 
 from __future__ import annotations
 
+import torch
 from torch import Tensor, nn
 
 from gibench.baselines.training.padding import padded
@@ -20,6 +21,27 @@ SMALLEST = 8
 """Pixels along a side: a quarter of less has no border to mirror. Smaller images are padded."""
 
 
+class Mirrored(nn.Module):
+    """Pads each side with the mirror image of what lies at it. Of copies: torch's own has a gradient on a GPU that is
+    not the same every time.
+    """
+
+    def __init__(self, margin: int) -> None:
+        """margin: pixels."""
+        super().__init__()
+        self.margin = margin
+
+    def forward(self, features: Tensor) -> Tensor:
+        """(N, C, H, W), sides longer than the margin."""
+        for dim in (-1, -2):
+            last = features.shape[dim] - 1
+            before, after = (
+                features.narrow(dim, start, self.margin).flip(dim) for start in (1, last - self.margin)
+            )
+            features = torch.cat([before, features, after], dim=dim)
+        return features
+
+
 class ResidualBlock(nn.Module):
     """Two 3 × 3 convolutions whose result is added to what they were given."""
 
@@ -27,11 +49,11 @@ class ResidualBlock(nn.Module):
         """channels: in and out."""
         super().__init__()
         self.layers = nn.Sequential(
-            nn.ReflectionPad2d(1),
+            Mirrored(1),
             nn.Conv2d(channels, channels, 3),
             nn.InstanceNorm2d(channels),
             nn.ReLU(),
-            nn.ReflectionPad2d(1),
+            Mirrored(1),
             nn.Conv2d(channels, channels, 3),
             nn.InstanceNorm2d(channels),
         )
@@ -44,16 +66,16 @@ class ResidualBlock(nn.Module):
 class ResidualGenerator(nn.Module):
     """See the module."""
 
-    def __init__(self, inputs: int, outputs: int = 3) -> None:
-        """inputs, outputs: channels."""
+    def __init__(self, inputs: int, outputs: int = 3, width: int = WIDTH) -> None:
+        """inputs, outputs: channels. width: channels at full resolution."""
         super().__init__()
-        layers: list[nn.Module] = [nn.ReflectionPad2d(3), *_normalised(nn.Conv2d(inputs, WIDTH, 7))]
-        for count in (WIDTH, 2 * WIDTH):
+        layers: list[nn.Module] = [Mirrored(3), *_normalised(nn.Conv2d(inputs, width, 7))]
+        for count in (width, 2 * width):
             layers += _normalised(nn.Conv2d(count, 2 * count, 3, 2, padding=1))
-        layers += [ResidualBlock(4 * WIDTH) for _ in range(BLOCKS)]
-        for count in (4 * WIDTH, 2 * WIDTH):
+        layers += [ResidualBlock(4 * width) for _ in range(BLOCKS)]
+        for count in (4 * width, 2 * width):
             layers += _normalised(nn.ConvTranspose2d(count, count // 2, 3, 2, padding=1, output_padding=1))
-        layers += [nn.ReflectionPad2d(3), nn.Conv2d(WIDTH, outputs, 7)]
+        layers += [Mirrored(3), nn.Conv2d(width, outputs, 7)]
         self.layers = nn.Sequential(*layers)
 
     def forward(self, image: Tensor) -> Tensor:

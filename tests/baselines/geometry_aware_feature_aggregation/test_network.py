@@ -7,6 +7,7 @@ import itertools
 import pytest
 import torch
 
+from gibench.baselines.geometry_aware_feature_aggregation import network as network_module
 from gibench.baselines.geometry_aware_feature_aggregation.network import (
     FULL,
     MINI,
@@ -87,11 +88,14 @@ def test_a_brighter_room_is_the_same_room(factor):
 def test_rows_of_the_attention_add_up_to_1_and_come_from_geometry_alone():
     net = network()
     kept = []
-    net.attention.register_forward_hook(lambda module, given, made: kept.append(made))
+    # What the aggregation is given, which asks for one block of rows after the other.
+    net.aggregation.register_forward_pre_hook(
+        lambda module, given: kept.append(list(given[1])) or (given[0], kept[-1])
+    )
     direct, albedo, geometry = view()
     for light in (direct, 0 * direct):
         indirect(net, light, albedo, geometry)
-    first, second = kept
+    (first,), (second,) = kept
     assert first.shape == (2, 2, 48, 48)
     torch.testing.assert_close(first.sum(-1), torch.ones(2, 2, 48))
     assert (first >= 0).all()
@@ -104,8 +108,8 @@ def test_the_attention_is_the_formula():
     net = network()
     geometry = torch.randn(1, 16, 3, 4)
     inputs, light = torch.randn(1, GEOMETRY, 3, 4), torch.randn(1, 2, 16, 3, 4)
-    attention = net.attention(geometry, inputs)
-    found = net.aggregation(light, attention)
+    (attention,) = net.attention(geometry, inputs)
+    found = net.aggregation(light, [attention])
     both = torch.cat([geometry, inputs], 1)[0].flatten(1)
     query, key = (
         part.weight[:, :, 0, 0] @ both + part.bias[:, None]
@@ -127,6 +131,17 @@ def test_the_attention_is_the_formula():
             torch.testing.assert_close(
                 found[0, colour].flatten(1)[:, i], x[:, i] + torch.cat(parts), atol=1e-5, rtol=1e-5
             )
+
+
+@torch.no_grad()
+def test_an_attention_in_blocks_is_the_attention(monkeypatch):
+    net = network()
+    direct, albedo, geometry = view()
+    expected = indirect(net, direct, albedo, geometry)
+    monkeypatch.setattr(network_module, "LARGEST", 2 * 2 * 48 * 7)
+    features, inputs = torch.randn(2, 16, 6, 8), torch.randn(2, GEOMETRY, 6, 8)
+    assert [len(rows[0, 0]) for rows in net.attention(features, inputs)] == [7] * 6 + [6]
+    torch.testing.assert_close(indirect(net, direct, albedo, geometry), expected, rtol=1e-4, atol=0)
 
 
 @torch.no_grad()

@@ -1,0 +1,100 @@
+"""What the methods share that add to a frame's direct light the indirect light that a network makes of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import torch
+from torch import nn
+
+from gibench.baselines.direct_light.tracer import DirectLight
+from gibench.baselines.image_to_image.camera_space import in_camera_space
+from gibench.baselines.image_to_image.device_frames import DeviceFrames, channels_first, torch_device
+from gibench.baselines.image_to_image.examples import READ, Examples
+from gibench.baselines.image_to_image.frames import Frames, held_out
+from gibench.baselines.image_to_image.learner import EPOCHS, IndirectLight, Plan
+from gibench.baselines.image_to_image.shading import CHANNELS, geometry, indirect
+from gibench.baselines.method import MethodError, Prediction, Setting, Site, Training, View
+from gibench.baselines.sources import digest
+from gibench.baselines.stages import Stages
+from gibench.baselines.training import artifacts
+from gibench.baselines.training.budget import Budget
+from gibench.baselines.training.checkpoints import Checkpoint
+from gibench.baselines.training.errors import CheckpointError
+from gibench.baselines.training.loop import train
+from gibench.baselines.training.reproducible import seeded
+
+HELD_OUT, MOST_HELD_OUT = 0.05, 8
+"""Share of the training rooms that a network does not learn from, and how many of their frames are looked at."""
+
+
+class IndirectByNetwork(DirectLight):
+    """A method with `KNOBS`. A subclass says what network it is, a module as `shading.indirect` takes it."""
+
+    def __init__(self, settings: Mapping[str, Setting]) -> None:
+        """settings: all knobs of the method."""
+        super().__init__(settings)
+        self.settings = dict(settings)
+
+    def network(self) -> nn.Module:
+        """The network, untrained."""
+        raise NotImplementedError
+
+    @staticmethod
+    def parts_of(site: Site) -> list[str]:
+        """Direct light as it is shown, and as networks are given it."""
+        return ["full", "direct_diffuse"]
+
+    def train(self, training: Training) -> float:
+        """Learn indirect light from the rooms that are not held out."""
+        views = training.views
+        learned, apart = held_out(views, HELD_OUT, MOST_HELD_OUT)
+        plan = Plan.of(self.settings, training.seed)
+        with seeded(plan.seed):
+            network = self.network().to("cuda" if torch.cuda.is_available() else "cpu")
+        examples = [Examples(Frames(views, READ, numbers)) for numbers in (learned, apart)]
+        learner = IndirectLight(network, examples[0], examples[1], plan)
+        steps = None if training.seconds else EPOCHS * -(-len(learned) // plan.batch)
+        owner = {**self.settings, "views": views.sha256, "sources": digest(type(self).__module__)}
+        trained = train(
+            learner,
+            learner.batches(),
+            Budget(steps=steps, seconds=training.seconds),
+            seed=plan.seed,
+            checkpoint=Checkpoint(training.checkpoint, owner),
+            title=type(self).__name__,
+        )
+        artifacts.keep(training.folder, trained)
+        return trained.before
+
+    def prepare(self, site: Site) -> None:
+        """Read the network, and record what a frame needs."""
+        super().prepare(site)
+        if site.weights is None:
+            raise MethodError("the network has not been trained: it needs the folder that `train` filled")
+        network = self.network()
+        try:
+            network.load_state_dict(artifacts.kept(site.weights)[0]["network"])
+        except (CheckpointError, RuntimeError, KeyError) as problem:
+            first = str(problem).splitlines()[0]
+            raise MethodError(
+                f"the trained network in {site.weights} cannot be read ({first}): remove that folder"
+            ) from problem
+        self.parameters = sum(one.numel() for one in network.parameters())
+        self._network = network.eval().requires_grad_(False).to(torch_device())
+        self._surfaces = DeviceFrames(site.scene, [name for name in CHANNELS if name != "direct_diffuse"])
+
+    def render(self, view: View, stages: Stages) -> Prediction:
+        """Direct light, and what the network says to it. `lit`: share of the pixels that direct light falls on."""
+        parts, _ = self.images(view, stages)
+        with stages.stage("g-buffer"):
+            surfaces = in_camera_space(self._surfaces.read(view.camera, view.resolution), view.camera)
+        with stages.stage("inference"), torch.inference_mode():
+            full, direct = (channels_first(parts[name]) for name in ("full", "direct_diffuse"))
+            made = indirect(self._network, direct[None], surfaces["albedo"][None], geometry(surfaces)[None])[
+                0
+            ]
+            images = [image.movedim(0, -1).contiguous() for image in (full + made, made)]
+        lit = float((direct > 0).any(dim=0).float().mean())
+        extra = {"parameters": float(self.parameters), "lit": lit}
+        return Prediction(images[0], indirect=images[1], extra=extra)

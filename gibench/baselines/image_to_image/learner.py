@@ -1,0 +1,151 @@
+"""How a network learns indirect light: content, perception and a judge (Gai, Wang & Li, section 3.4)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+
+from gibench.baselines.image_to_image.examples import Draw, Examples, inputs_of
+from gibench.baselines.image_to_image.frames import Images
+from gibench.baselines.image_to_image.shading import LIGHT, OUTPUT, Inputs, demodulated
+from gibench.baselines.method import Setting
+from gibench.baselines.training.batches import batches
+from gibench.baselines.training.crops import random_window
+from gibench.baselines.training.display import displayed
+from gibench.baselines.training.learner import Learner, Step
+from gibench.baselines.training.loop import Batches
+from gibench.baselines.training.losses.adversarial import PatchGan, fooling, judging
+from gibench.baselines.training.losses.perceptual import Vgg16Features
+from gibench.baselines.training.losses.pixels import absolute, smooth_absolute
+from gibench.baselines.training.reproducible import seeded
+from gibench.baselines.training.schedule import half_cosine, set_rate
+
+CONTENT, PERCEPTUAL, ADVERSARIAL = 0.7, 0.28, 0.02
+"""Weights of the losses, ω (section 3.4)."""
+
+RATE, JUDGE_RATE, JUDGE_BETA = 1e-3, 2e-4, 0.5
+"""Of Adam for the network, which falls along half a cosine to nothing, and of Adam for the judge, with its β₁."""
+
+LARGEST_GRADIENT = 1.0
+"""Norm that gradients of the network are cut down to."""
+
+LOOKED_EVERY, LOOKED_SIDE = 4, 64
+"""Steps from one with the perceptual and the adversarial loss to the next, each with as much more weight, and pixels
+along a side of what they look at: they cost more than all else.
+"""
+
+EPOCHS = 80
+"""Passes over the training frames where no seconds end a training (section 5.1)."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What decides a training, beside its frames and its network.
+
+    crop: pixels along a side of what a step sees of a frame, batch: frames a step. perceptual, adversarial: whether
+    there are these losses.
+    """
+
+    crop: int
+    batch: int
+    perceptual: bool
+    adversarial: bool
+    seed: int
+
+    @staticmethod
+    def of(settings: Mapping[str, Setting], seed: int) -> Plan:
+        """From the settings of a method."""
+        return Plan(
+            int(settings["crop"]),
+            int(settings["batch"]),
+            bool(settings["perceptual"]),
+            bool(settings["adversarial"]),
+            seed,
+        )
+
+
+class IndirectLight(Learner):
+    """A network of `shading.indirect`, and a judge of single colours that learns along."""
+
+    def __init__(self, network: nn.Module, learned: Examples, held_out: Examples, plan: Plan) -> None:
+        """network: on its device."""
+        self.learned, self.held_out, self.plan = learned, held_out, plan
+        self.network = network
+        device = next(network.parameters()).device
+        networks = {"network": network}
+        optimisers = {"network": torch.optim.Adam(network.parameters(), lr=RATE)}
+        if plan.adversarial:
+            with seeded(plan.seed):
+                judge = PatchGan(LIGHT + 1).to(device)
+            networks["judge"] = judge
+            optimisers["judge"] = torch.optim.Adam(
+                judge.parameters(), lr=JUDGE_RATE, betas=(JUDGE_BETA, 0.999)
+            )
+        self.features = Vgg16Features().to(device) if plan.perceptual else None
+        super().__init__(networks, optimisers, product=["network"])
+
+    def batches(self, processes: int = 0) -> Batches:
+        """Of what `step` learns from."""
+        plan = self.plan
+        return batches(self.learned, plan.batch, plan.seed, draw=Draw(plan.crop), processes=processes)
+
+    @cached_property
+    def _judged(self) -> list[Images]:
+        """The frames that are held out, each as a batch, read once."""
+        examples = (inputs_of(self.held_out[index]) for index in range(len(self.held_out)))
+        return [{name: image[None] for name, image in example.items()} for example in examples]
+
+    def error(self) -> Tensor:
+        """Mean absolute difference of display values of diffuse light, direct and indirect, of whole frames."""
+        errors = []
+        for example in self._judged:
+            batch = _on(example, self.device)
+            inputs = Inputs.of(batch["direct"], batch["albedo"], batch["geometry"])
+            made = inputs.radiance(self.network(inputs.light, inputs.geometry))
+            errors.append(absolute(*_shown(batch, made)))
+        return torch.stack(errors).mean()
+
+    def step(self, batch: Any, now: Step) -> dict[str, Tensor]:
+        """Down equation 6."""
+        batch = _on(batch, self.device)
+        set_rate(self.optimisers["network"], RATE * half_cosine(now.progress))
+        inputs = Inputs.of(batch["direct"], batch["albedo"], batch["geometry"], batch["unit"])
+        light = OUTPUT.decode(self.network(inputs.light, inputs.geometry))
+        truth = demodulated(batch["truth"], inputs.albedo) / inputs.unit
+        made, true = torch.log1p(light), torch.log1p(truth)
+        content = smooth_absolute(made, true)
+        losses = {"content": content}
+        loss = CONTENT * content
+        looked = now.number % LOOKED_EVERY == 0
+        window = random_window(made.shape[-2:], LOOKED_SIDE, now.random) if looked else None
+        if self.features is not None and window is not None:
+            shown = _shown(batch, inputs.radiance_of(light))
+            losses["perceptual"] = self.features(*(window.of(image) for image in shown))
+            loss = loss + LOOKED_EVERY * PERCEPTUAL * losses["perceptual"]
+        judge = self.networks.get("judge")
+        if judge is not None and window is not None:
+            # A colour at a time, whatever the network does.
+            given = window.of(inputs.light).transpose(1, 2).flatten(0, 1)
+            ours, theirs = (window.of(image).flatten(0, 1)[:, None] for image in (made, true))
+            losses["adversarial"] = fooling(judge(given, ours))
+            loss = loss + LOOKED_EVERY * ADVERSARIAL * losses["adversarial"]
+        self.descend("network", loss, largest_gradient=LARGEST_GRADIENT)
+        if judge is not None and window is not None:
+            losses["judge"] = judging(judge(given, theirs), judge(given, ours.detach()))
+            self.descend("judge", losses["judge"])
+        return {"loss": loss, **losses}
+
+
+def _on(batch: Images, device: torch.device) -> Images:
+    return {name: image.to(device) for name, image in batch.items()}
+
+
+def _shown(batch: Images, indirect: Tensor) -> tuple[Tensor, Tensor]:
+    """Diffuse light with that indirect light and with the true one, as it is displayed."""
+    direct, exposure = batch["direct"], batch["exposure"]
+    return displayed(direct + indirect, exposure), displayed(direct + batch["truth"], exposure)

@@ -1,0 +1,249 @@
+"""The methods as a benchmark uses them: sizes, a training, a frame; and frames that are hard for all of them."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+import torch
+
+from gibench.baselines.image_to_image import implementation
+from gibench.baselines.image_to_image.examples import READ, Draw, Examples, inputs_of
+from gibench.baselines.image_to_image.frames import Frames
+from gibench.baselines.image_to_image.learner import IndirectLight, Plan
+from gibench.baselines.image_to_image.shading import GEOMETRY, Inputs, indirect
+from gibench.baselines.method import MethodError, Training
+from gibench.baselines.stages import Stages
+from gibench.baselines.training import artifacts
+from gibench.baselines.training.errors import TrainingError
+from gibench.baselines.training.learner import Step
+from gibench.baselines.training_set import training_set
+from gibench.benchmarks.registry import installed
+from gibench.datasets.loading import open_dataset
+from gibench.rendering.camera import PinholeCamera
+from gibench.rendering.scene import load_dict, load_scene
+from tests.baselines.sites import site, view
+from tests.rendering import scenes
+
+SMALL = {"width": 0.125, "crop": 32}
+NAMES = ("gfa", "deep-shading", "pix2pix", "resnet", "bcn")
+
+
+def made(name, **settings):
+    method = installed().get(name).method
+    return method.load()(method.settings({**SMALL, **settings}))
+
+
+def network(name, **settings):
+    torch.manual_seed(0)
+    return made(name, **settings).network().eval()
+
+
+@pytest.mark.parametrize(
+    ("name", "millions"),
+    [
+        ("gfa", 14.42),
+        ("gfa:mini", 8.76),
+        ("gfa:no-perceptual", 14.42),
+        ("deep-shading", 7.73),
+        ("pix2pix", 41.84),
+        ("resnet", 11.41),
+        ("bcn", 3.95),
+    ],
+)
+def test_parameters_of_the_paper(name, millions):
+    """pix2pix and resnet have 41.83 M and 11.38 M with three channels in; here there are 13."""
+    with torch.device("meta"):
+        count = sum(one.numel() for one in made(name, width=1.0).network().parameters())
+    assert round(count / 1e6, 2) == millions
+
+
+def test_variants_are_what_their_names_say():
+    cards = {id: installed().get(id).method for id in installed().methods if id.startswith("gfa")}
+    assert cards.keys() == {
+        f"gfa{variant}"
+        for variant in ("", ":mini", ":normal", ":one-head", ":no-perceptual", ":no-adversarial")
+    }
+    assert made("gfa:normal").network().size.colours == 3
+    assert made("gfa:one-head").network().size.heads == 1
+    assert not Plan.of(cards["gfa:no-perceptual"].settings(), 0).perceptual
+    assert not Plan.of(cards["gfa:no-adversarial"].settings(), 0).adversarial
+
+
+@pytest.fixture(scope="module")
+def weights(room, tmp_path_factory):
+    """Weights of `gfa` after a few steps."""
+    folder = tmp_path_factory.mktemp("weights")
+    training = Training(training_set(room), None, 0, folder, folder / "checkpoint", Stages())
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(implementation, "EPOCHS", 2)
+        made("gfa").train(training)
+    return folder
+
+
+def test_a_training_and_a_frame(room, weights, tmp_path):
+    record = artifacts.record(weights)
+    assert record["steps"] == 2 * 3
+    assert record["curve"][0]["step"] == 0
+    assert record["best"]["error"] <= record["curve"][0]["error"]
+    dataset = open_dataset(room)
+    scene = load_scene(dataset.room_folder(0) / "scene.xml")
+    method = made("gfa", denoise=False, spp=4)
+    with pytest.raises(MethodError, match="has not been trained"):
+        method.prepare(site(scene, tmp_path))
+    method.prepare(dataclasses.replace(site(scene, tmp_path), weights=weights))
+    stages = Stages()
+    found = method.render(view(dataset[0].camera), stages)
+    assert set(stages.seconds) == {"ray casting", "g-buffer", "inference"}
+    for image in (found.color, found.indirect):
+        assert image.shape == (24, 32, 3)
+        assert np.isfinite(image).all()
+    assert (found.color >= found.indirect).all()
+    assert (found.indirect > 0).all()
+    assert found.extra["lit"] > 0.1
+    (weights / artifacts.WEIGHTS).rename(tmp_path / "away")
+    try:
+        with pytest.raises(MethodError, match="remove that folder"):
+            method.prepare(dataclasses.replace(site(scene, tmp_path), weights=weights))
+    finally:
+        (tmp_path / "away").rename(weights / artifacts.WEIGHTS)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_step_of_each(views, name):
+    frames = Examples(Frames(views, READ))
+    learner = IndirectLight(network(name), frames, frames, Plan(32, 2, True, True, 0))
+    before = learner.look()
+    assert np.isfinite(before)
+    batch = next(iter(learner.batches()(0)))
+    assert batch["direct"].shape == (2, 3, 32, 32)
+    losses = learner.step(batch, Step(0, 0.0, np.random.default_rng(0)))
+    assert list(losses) == ["loss", "content", "perceptual", "adversarial", "judge"]
+    assert all(torch.isfinite(loss) for loss in losses.values())
+    assert learner.look() != before
+    assert learner.weights().keys() == {"network"}
+
+
+def frame(height=24, width=32, direct=1.0, albedo=0.5):
+    generator = torch.Generator().manual_seed(0)
+    light = direct * torch.rand(1, 3, height, width, generator=generator)
+    return light, torch.full_like(light, albedo), torch.randn(1, GEOMETRY, height, width, generator=generator)
+
+
+@torch.no_grad()
+@pytest.mark.parametrize("name", NAMES)
+def test_hard_frames_stay_finite(name):
+    net = network(name)
+    for direct in (0.0, 1e-4, 1e5):  # none in view, dark, over-exposed
+        for albedo in (0.0, 1.0):
+            found = indirect(net, *frame(direct=direct, albedo=albedo))
+            assert torch.isfinite(found).all()
+            assert (found >= 0).all()
+    for size in ((1, 1), (8, 8), (33, 70)):
+        assert indirect(net, *frame(*size)).shape == (1, 3, *size)
+
+
+@torch.no_grad()
+@pytest.mark.parametrize("name", NAMES)
+def test_a_room_that_is_lit_a_hundred_thousand_times_brighter_is_the_same_room(name):
+    net = network(name)
+    dark, albedo, geometry = frame(direct=1e-4)
+    expected = indirect(net, dark, albedo, geometry)
+    factor = 2.0**30
+    assert torch.equal(indirect(net, factor * dark, albedo, geometry), factor * expected)
+    # Instance norms of few pixels turn a difference in the last bit into more.
+    torch.testing.assert_close(indirect(net, 1e9 * dark, albedo, geometry), 1e9 * expected, rtol=1e-3, atol=0)
+
+
+def radiance(net, example):
+    one = {name: image[None] for name, image in inputs_of(example).items()}
+    inputs = Inputs.of(one["direct"], one["albedo"], one["geometry"])
+    return inputs.radiance(net(inputs.light, inputs.geometry))[0]
+
+
+@torch.no_grad()
+def test_from_the_file_to_radiance_colours_and_exposure_are_what_they_are(views, weights):
+    """With trained weights: permuted colours come out permuted, a brighter frame brighter."""
+    net = network("gfa")
+    net.load_state_dict(artifacts.kept(weights)[0]["network"])
+    example = Examples(Frames(views, READ))[0]
+    expected = radiance(net, example)
+    assert expected.std() > 0
+    colours = ("direct_diffuse", "albedo", "indirect_diffuse")
+    turned = {name: image[[2, 0, 1]] if name in colours else image for name, image in example.items()}
+    torch.testing.assert_close(radiance(net, turned), expected[[2, 0, 1]], rtol=1e-4, atol=0)
+    brighter = {**example, "direct_diffuse": 8 * example["direct_diffuse"]}
+    assert torch.equal(radiance(net, brighter), 8 * expected)
+    brighter = {**example, "direct_diffuse": 0.3 * example["direct_diffuse"]}
+    torch.testing.assert_close(radiance(net, brighter), 0.3 * expected, rtol=1e-4, atol=0)
+    # All colours together, it is another network for every order of them.
+    together = network("gfa:normal")
+    swapped = radiance(together, turned)
+    assert not torch.allclose(swapped, radiance(together, example)[[2, 0, 1]], rtol=1e-2)
+
+
+def test_what_a_step_sees(views):
+    example = Examples(Frames(views, READ))[0]
+    whole = inputs_of(example)
+    seen = [Draw(16)(example, np.random.default_rng(seed)) for seed in range(24)]
+    assert {tuple(one["direct"].shape) for one in seen} == {(3, 16, 16)}
+    ratios = [float(one["unit"] / whole["unit"]) for one in seen]
+    assert 0.25 <= min(ratios) < 0.6
+    assert 1.6 < max(ratios) <= 4
+    # As many points lie left of the camera as right of it in mirror images, and both kinds are drawn.
+    corners = {tuple(one["direct"].flatten().tolist()) for one in seen}
+    assert len(corners) > 12
+    full = [Draw(64)(example, np.random.default_rng(seed)) for seed in range(8)]
+    kinds = {torch.equal(one["direct"], whole["direct"]) for one in full}
+    assert kinds == {True, False}
+    for one in full:
+        same = torch.equal(one["direct"], whole["direct"])
+        sign = 1 if same else -1
+        x = one["geometry"][0] if same else one["geometry"][0].flip(-1)
+        torch.testing.assert_close(x, sign * whole["geometry"][0])
+
+
+def test_one_frame_is_too_few(room, tmp_path):
+    only = training_set(room)
+    lonely = type(only)(only._dataset[:1])
+    with pytest.raises(TrainingError, match="there are 1: ask for more `views`"):
+        made("bcn").train(Training(lonely, 1.0, 0, tmp_path, tmp_path / "checkpoint", Stages()))
+
+
+def hall(color):
+    """A hall of 24 m: its left wall has a colour and is lit by a lamp that faces it, all else is grey."""
+    grey = {"type": "diffuse", "reflectance": scenes.rgb(0.5)}
+    return {
+        "type": "scene",
+        "back": scenes.rectangle([0, 2, 1.5], [0, -1, 0], (12, 1.5), bsdf=grey),
+        "floor": scenes.rectangle([0, 0, 0], [0, 0, 1], (12, 4), bsdf=grey),
+        "wall": scenes.rectangle(
+            [-12, 0, 1.5], [1, 0, 0], (4, 1.5), bsdf={"type": "diffuse", "reflectance": scenes.rgb(*color)}
+        ),
+        "lamp": scenes.rectangle([-11, 0, 2.5], [-1, 0, 0], (1, 0.4), bsdf=grey, emitter=scenes.area(20)),
+        "light": scenes.rectangle([0, 0, 6], [0, 0, -1], (12, 4), bsdf=grey, emitter=scenes.area(0.5)),
+    }
+
+
+def test_a_wall_far_away_colours_what_lies_beyond_the_reach_of_convolutions(weights, tmp_path):
+    """The paper's Figure 8: a green wall on the left, lit by a lamp that faces it."""
+    camera = PinholeCamera((0, -6, 1.5), (0, 2, 1.5), np.radians(125))
+    scene = load_dict(hall((0.1, 0.7, 0.1)))
+    method = made("gfa", denoise=False, spp=1)
+    method.prepare(dataclasses.replace(site(scene, tmp_path), weights=weights))
+    shown = view(camera, resolution=(384, 16))
+    there, here = (slice(None), slice(0, 40)), (slice(None), slice(300, None))
+
+    def colour_of(prediction):
+        red, green, _ = np.moveaxis(prediction.indirect[here], -1, 0)
+        return np.abs(green / red - 1).max()
+
+    found = method.render(shown, Stages())
+    seen = method._surfaces.read(camera, shown.resolution)["albedo"]
+    assert (seen[1][there] > 2 * seen[0][there]).any()
+    assert torch.equal(seen[0][here], seen[1][here])
+    assert colour_of(found) > 1e-4
+    # Without what is gathered from afar, grey surfaces under grey light are grey.
+    method._network.aggregation.values.weight.zero_()
+    assert colour_of(method.render(shown, Stages())) < 1e-6
