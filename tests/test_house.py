@@ -123,3 +123,24 @@ def test_names_are_the_fields():
         if name in NOT_THE_FIELDS or name.endswith("_telling")
     ]
     assert found == []
+
+
+def test_lights_are_sampled_in_one_place():
+    """Methods and references share `rendering.light_sampling`; one that samples by itself has other noise than they."""
+    own = {"light_sampling.py", "guide.py"}
+    for path in PACKAGE.rglob("*.py"):
+        calls = {
+            node.func.attr
+            for node in ast.walk(ast.parse(path.read_text()))
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)
+        }
+        found = calls & {"sample_emitter_direction", "pdf_emitter_direction"}
+        assert not found or path.name in own, f"{path.relative_to(PACKAGE)} calls {found}"
+
+
+def test_torch_computes_where_the_variant_does():
+    """Whether there is a GPU decides nothing by itself, or methods of one board would run on two devices."""
+    for path in (PACKAGE / "baselines").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.IfExp) and "is_available" in ast.unparse(node.test):
+                raise AssertionError(f"{path.relative_to(PACKAGE)}: {ast.unparse(node)}")

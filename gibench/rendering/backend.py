@@ -205,6 +205,16 @@ def is_scalar() -> bool:
     return str(mi.variant()).startswith("scalar")
 
 
+def torch_device() -> str:
+    """What torch calls the device that the current variant computes on: "cuda" or "cpu".
+
+    A GPU that is there beside a variant of the processor stays unused, so that all methods run on one clock.
+    """
+    import mitsuba as mi
+
+    return "cuda" if str(mi.variant()).startswith("cuda") else "cpu"
+
+
 def registry_key(kind: str, plugin: Any) -> int:
     """Key of a plugin inside a kernel: its registry index, or the object itself in scalar mode.
 

@@ -40,6 +40,9 @@ LEFT_CHANGE = 0.02
 EXPECTED_SPREAD = 0.1
 """Of the gains of the bands around that of the whole image; what is known of a band less well than that counts less."""
 
+FAINT = 1e-6
+"""Share of the light of a whole frame below which a part counts as black: nobody sees by what factor it changed."""
+
 NEIGHBOURS = 5
 """Pixels on a side of the square whose brightest sample is the most that its middle may become."""
 
@@ -117,13 +120,14 @@ def balanced(clean: Image, samples: Image) -> Image:
     return np.asarray(clean * _ratio(wanted, now), dtype=np.float32)
 
 
-def mean_change(clean: Image, samples: Image) -> float:
+def mean_change(clean: Image, samples: Image, *, whole: float = 0.0) -> float:
     """By how much denoising changed the mean of a part, in the channel where it is most, relative to that mean.
 
-    Negative where light was lost. 0 for a part that is black.
+    whole: mean of the frame that the part belongs to, in its brightest channel. Negative where light was lost. 0 for a
+    part that is black, or as good as black beside the whole.
     """
     before, after = (image.mean((0, 1), dtype=np.float64) for image in (samples, clean))
-    if not before.any():
+    if before.max() <= FAINT * whole:
         return 0.0
     # A channel that is next to black in the whole part may change by any factor, and nobody sees it.
     change = (after - before) / np.maximum(before, 0.01 * before.max())

@@ -34,6 +34,9 @@ MAXIMUM_LEVELS = 3
 ROUND = 64
 """Samples a pixel that are added at a time until a target error is met."""
 
+SMALLEST = float(np.finfo(np.float32).tiny)
+"""Radiance below which the spread of groups counts as 0."""
+
 RELATIVE_FLOOR = 0.01
 """Pixels darker than this share of the frame's mean luminance are left out of its median relative error."""
 
@@ -216,8 +219,10 @@ def _traced(
     for component in sum(parts[name] for name in PARTS):
         group = dr.block_sum(component, 4**levels) * groups
         mean = dr.block_sum(group / groups, groups)
-        # As multiples of the mean, which are at most the number of groups: squares of huge radiance overflow.
-        multiple = dr.select(group > 0, group / dr.repeat(mean, groups), 0)
+        # As multiples of the mean, which are at most the number of groups: squares of huge radiance overflow. A mean
+        # below the smallest normal number has lost its digits, or is 0 where its groups are not.
+        scale = dr.repeat(mean, groups)
+        multiple = dr.select(scale >= SMALLEST, group / dr.maximum(scale, SMALLEST), 1)
         means.append(mean)
         squares.append(dr.block_sum(dr.square(multiple - 1), groups))
     count = dr.sum(invalid)

@@ -58,7 +58,8 @@ def _radiance(
         guides = {name: frame_of(estimate.part(name), resolution) for name in ("albedo", "normal")}
         # What is seen straight has no noise but that of its edges, which are meant to stay as they are.
         clean = {name: denoise_part(parts[name], **guides) for name in PARTS if name != "emission"}
-        change = max((mean_change(clean[name], parts[name]) for name in clean), key=abs)
+        whole = float(sum(part.mean((0, 1), dtype=np.float64) for part in parts.values()).max())
+        change = max((mean_change(clean[name], parts[name], whole=whole) for name in clean), key=abs)
         parts |= clean
     result: dict[str, NDArray[Any]] = dict(parts)
     color = np.zeros_like(parts["emission"])

@@ -21,6 +21,11 @@ LUMINANCE = (0.2126, 0.7152, 0.0722)
 """Of linear Rec. 709."""
 
 
+FAINT = 1e-6
+"""Specular albedo below which a surface has no specular lobe: weights of blends and masks leave the rounding of float32
+where one of two materials is all there is."""
+
+
 def _attribute(evaluate, bsdf, name, si, active, default):
     has = active & bsdf.has_attribute(name, active)
     # The scalar variant raises where a vectorised one returns zeros for lanes that are masked out.
@@ -76,7 +81,8 @@ def roughness(scene: Scene, bsdf: Any, si: Any, active: Any) -> Any:
         weight = part.weight * (LUMINANCE[0] * lobe.x + LUMINANCE[1] * lobe.y + LUMINANCE[2] * lobe.z)
         total += weight
         rough += weight * _leaf_roughness(scene, part.bsdf, si, on)
-    return dr.select(active, dr.select(total > 0, rough / dr.select(total > 0, total, 1), mi.Float(1)), 0)
+    some = total > FAINT
+    return dr.select(active, dr.select(some, rough / dr.select(some, total, 1), mi.Float(1)), 0)
 
 
 def _metallic(bsdf, si, active):

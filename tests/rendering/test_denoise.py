@@ -108,6 +108,12 @@ def test_the_change_is_that_of_the_channel_that_changed_most():
     assert denoise.mean_change(0 * samples, 0 * samples) == 0
 
 
+def test_the_change_of_a_part_that_nobody_sees_is_none():
+    dust = np.full((4, 4, 3), 1e-12, dtype=np.float32)
+    assert denoise.mean_change(2 * dust, dust, whole=1.0) == 0
+    assert denoise.mean_change(2 * dust, dust, whole=1e-9) == pytest.approx(1)
+
+
 def test_a_frame_says_how_much_denoising_changed():
     scene = load_dict(scenes.box("coat"))
     options = {"resolution": (48, 48), "channels": ["radiance"], "max_depth": 4, "spp": 8, "seed": 2}

@@ -90,6 +90,16 @@ def test_black_scene_has_no_error():
     assert not any(values.any() for values in frame.arrays.values())
 
 
+@pytest.mark.parametrize("radiance", [1e-44, 3e-41, 1e-38, 1e-30])
+def test_light_at_the_end_of_float32_has_a_standard_error_that_is_a_number(radiance):
+    """The mean of 16 groups is 0 where no group is, once it is less than the least number that there is."""
+    dim = scenes.box("diffuse")
+    dim["lamp"]["emitter"] = scenes.area(radiance)
+    found = estimate_radiance(load_dict(dim), scenes.CAMERA, (8, 8), spp=16).standard_error
+    assert np.isfinite(found).all()
+    assert (found <= radiance).all()
+
+
 @pytest.mark.parametrize(
     "options",
     [

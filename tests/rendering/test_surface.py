@@ -277,3 +277,12 @@ def test_principled_inside_of_others():
     below = furnace(two_sided(principled(metallic=0.4, specular=0.5)), side=-1.0, spp=4096)
     above = furnace(two_sided(principled(metallic=0.4, specular=0.5)), spp=4096)
     np.testing.assert_allclose(below["direct_diffuse"], above["direct_diffuse"], rtol=5e-3)
+
+
+@pytest.mark.parametrize("dust", [6e-8, 1e-7])
+def test_a_blend_of_one_material_but_for_rounding_has_its_roughness(dust):
+    """A lobe that only the rounding of a weight lets in is none: the surface is diffuse, not a polished metal."""
+    blend = {"type": "blendbsdf", "weight": dust, "a": DIFFUSE, "b": METAL}
+    assert surface_of(two_sided(blend), channels=("roughness",))[0] == 1
+    blend["weight"] = 0.01
+    assert surface_of(two_sided(blend), channels=("roughness",))[0] == pytest.approx(0.3, abs=1e-5)

@@ -22,6 +22,7 @@ from gibench.baselines.method import Prediction, Setting, Site, View
 from gibench.baselines.replay import Replay, camera_arrays, ray_generator
 from gibench.baselines.stages import Stages
 from gibench.rendering import surface
+from gibench.rendering.backend import torch_device
 from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.gbuffer import mirror_direction
 

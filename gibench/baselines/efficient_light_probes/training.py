@@ -35,6 +35,7 @@ from gibench.baselines.training.reproducible import seeded
 from gibench.baselines.training.schedule import half_cosine, set_rate
 from gibench.metrics.lpips_network import build_network
 from gibench.metrics.tone_map import reference_exposure
+from gibench.rendering.backend import torch_device
 
 BATCH = 2
 """Crops a step: many small steps learn more in the same time than few large ones."""
@@ -156,9 +157,9 @@ class Reconstructing(Learner):
     """The reconstruction network of a scene, which learns from all of its views but the last."""
 
     def __init__(self, examples: Sequence[Example], plan: Plan, device: str | None = None) -> None:
-        """examples: two at least. device: of torch, a GPU where there is one."""
+        """examples: two at least. device: of torch; where none is given that of the variant."""
         self.plan = plan
-        device = device or ("cuda" if torch.cuda.is_available() else "cpu")
+        device = device or torch_device()
         self.scale = scale_of(examples)
         self.learned, self.held_out = list(examples[:-1]), examples[-1]
         with seeded(plan.seed):

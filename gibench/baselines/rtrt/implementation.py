@@ -20,7 +20,16 @@ def _traced(scene, lightmap, camera, preliminary, seed, samples, bounces, width:
     sampler = mi.load_dict({"type": "independent"})
     sampler.seed(seed, width * height)
     radiance = glossy_radiance(
-        scene.mi_scene, scene.layers, lightmap, sampler, hits.si, hits.bsdf, hits.active, samples, bounces
+        scene.mi_scene,
+        scene.portals,
+        scene.layers,
+        lightmap,
+        sampler,
+        hits.si,
+        hits.bsdf,
+        hits.active,
+        samples,
+        bounces,
     )
     dr.eval(radiance)
     return radiance

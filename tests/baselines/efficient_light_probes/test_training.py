@@ -180,3 +180,8 @@ def test_earlier_cameras_lie_on_a_line_and_turn_steadily():
         assert abs(yaws[1] - yaws[0]) <= 2 * TURN + 1e-9
         np.testing.assert_allclose([v[2] for v in views], views[0][2])
         assert len({one.fov for one in found}) == 1
+
+
+def test_it_trains_on_the_device_of_the_variant(monkeypatch):
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
+    assert Reconstructing(EXAMPLES, PLAN).device.type == "cpu"

@@ -1,5 +1,7 @@
 """Glossy paths over the lightmap, against mirrors, the path tracer and energy."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,7 @@ from gibench.rendering.scene import load_dict
 from tests.baselines.glossy_rooms import CAMERA, LIGHTMAP, glossy_room, mirror_image, rendered
 from tests.baselines.meshes import diffuse, slab
 from tests.baselines.sites import site, view
-from tests.rendering import scenes
+from tests.rendering import scenes, test_portals
 
 RESOLUTION = (40, 30)
 RAW = {"denoise": False, "lightmap_denoise": True}
@@ -118,3 +120,34 @@ def test_denoising_brings_frames_nearer_to_the_truth(tmp_path):
         return np.sqrt(np.mean((np.minimum(image, bright) - np.minimum(truth, bright)) ** 2))
 
     assert error(smooth) < 0.8 * error(rough)
+
+
+def test_lights_are_sampled_as_the_path_tracer_samples_them(tmp_path):
+    """By daylight through two openings both spend their light samples on these: alike without noise, alike with it."""
+    closed = test_portals.room()
+    closed["floor"] = scenes.rectangle([0, 0, 0], [0, 0, 1], (1, 1), bsdf=scenes.MATERIALS["metal"])
+    del closed["lamp"]
+    # An even sky, which lobe samples alone would find by chance.
+    closed["sky"] = {"type": "constant", "radiance": scenes.rgb(5.0)}
+    camera = PinholeCamera((-0.9, -0.9, 1.5), (0.2, 0.2, 0.0), 0.6)
+
+    def direct_light(scene, name):
+        method = rtrt.METHOD.load()(
+            rtrt.METHOD.settings(
+                {"texels": 4, "lightmap_spp": 16, "samples": 16, "bounces": 1, "rays": 1} | RAW
+            )
+        )
+        method.prepare(site(scene, tmp_path, name=name))
+        frames = [
+            method.render(view(camera, seed=seed, resolution=(16, 12)), Stages()).specular
+            for seed in range(8)
+        ]
+        return np.array(frames, dtype=np.float64)
+
+    scene = load_dict(closed)
+    with_portals = replace(scene, openings=test_portals.OPENINGS_OF_ROOM)
+    by_chance, aimed = direct_light(scene, "chance"), direct_light(with_portals, "aimed")
+    error = np.sqrt(by_chance.var(axis=0, ddof=1).mean() / len(by_chance) / by_chance[0].size)
+    assert abs(by_chance.mean() - aimed.mean()) < 5 * error + 0.01 * aimed.mean()
+    noise = [frames.var(axis=0, ddof=1).mean() for frames in (by_chance, aimed)]
+    assert noise[1] < 0.6 * noise[0], noise
