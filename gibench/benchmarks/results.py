@@ -15,9 +15,10 @@ from gibench.benchmarks import machine as machines
 from gibench.benchmarks import predictions
 from gibench.benchmarks.costs import BOOKED
 from gibench.benchmarks.errors import ResultsError
+from gibench.benchmarks.references import reference_parts
 from gibench.benchmarks.result_files import RunFolder
 from gibench.benchmarks.scenes import SceneFiles, scenes_in
-from gibench.benchmarks.scoring import exposures_of, read_scores, reference_parts
+from gibench.benchmarks.scoring import exposures_of, read_scores
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -200,6 +201,15 @@ class Results:
         columns = {"scene": "str", "frame": "int64", "metric": "str", "part": "str"}
         return pd.DataFrame(rows, columns=[*columns, "value"]).astype(columns | {"value": "float64"})
 
+    @cached_property
+    def unbiased(self) -> frozenset[str]:
+        """Metrics that are against the truth in all results, by samples of the references that were not denoised."""
+        found = [(set(scores.get("unbiased", ())), _metrics_in(scores)) for scores in self._scores.values()]
+        there = {name for _, names in found for name in names}
+        return frozenset(
+            name for name in there if all(name in own or name not in names for own, names in found)
+        )
+
     @property
     def skipped(self) -> dict[str, str]:
         """Metrics that could not be computed for some result, and why."""
@@ -271,6 +281,10 @@ def load(root: str | Path) -> Results:
     folder = RunFolder(Path(root))
     run = folder.read_run()
     return Results(folder, run, [folder.read_result(id) for id in folder.ids()])
+
+
+def _metrics_in(scores: Mapping[str, Any]) -> set[str]:
+    return {name for by_metric in scores["frames"].values() for name in by_metric}
 
 
 def _median_p95(values: list[float]) -> tuple[float, float]:

@@ -1,9 +1,14 @@
 """Scoring: metrics of predictions that lie on disk, computed once each, so that a new metric needs no rerun.
 
 All frames of a sequence are seen under one exposure, that of its references, and a still under its own; their parts
-too. What the reference's
-own noise costs is scored beside. A reference is the mean of two renderings a and b of the same variance, so its own
-error has the variance of (a − b)/2 = a − reference: metric(a, reference) is what a perfect method would get.
+too. Where references keep their samples beside what is denoised, quadratic metrics are against the truth and not
+against the reference (`gibench.metrics.unbiased`).
+
+What a reference is wrong by is scored beside, as its floor: of quadratic metrics its true error, where there are
+samples. For the others it is the mean of two renderings a and b of the same variance, so that its own error has at
+least the variance of (a − b)/2 = a − reference: metric(a, reference) is what a perfect method would get if denoising
+had no bias. One frame has too few pixels to say how far a good reference is from the truth, so that floor is of all
+frames of a scene together, and the same for each.
 """
 
 from __future__ import annotations
@@ -14,7 +19,7 @@ import warnings
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -22,14 +27,15 @@ from numpy.typing import NDArray
 
 import gibench
 from gibench import metrics
+from gibench.baselines.sources import digest, module_of
 from gibench.benchmarks import predictions
 from gibench.benchmarks.errors import ResultsError, RunError
 from gibench.benchmarks.records import Scores
+from gibench.benchmarks.references import read_reference, reference_parts
 from gibench.benchmarks.result_files import FORMAT, RunFolder
 from gibench.benchmarks.scenes import SceneFiles, scenes_in
 from gibench.benchmarks.track import CHANNELS_OF
 from gibench.datasets.errors import MakingError
-from gibench.datasets.exr import present_channels
 from gibench.datasets.files import as_json, write_whole
 from gibench.datasets.making import default_threads
 from gibench.datasets.pool import Listener, Report, Work, run_rooms
@@ -38,15 +44,20 @@ from gibench.errors import GibenchError
 Image = NDArray[np.float32]
 Frames = Callable[[int], dict[str, Image]]  # frame → part → image
 
+#: Modules that decide a score beside that of the metric.
+SHARED = ("gibench.metrics.evaluate", "gibench.metrics.unbiased", "gibench.metrics.reprojection")
+
 
 @dataclass(frozen=True)
 class Scored:
     """Result of scoring. done: score files that were written or completed. skipped: metric → why, each with how
-    many results it concerns. problems: results that cannot be read, one line each."""
+    many results it concerns. problems: results that cannot be read, one line each. clipped: metric → how many values
+    stand as 0 for an estimate below it."""
 
     done: int
     skipped: dict[str, tuple[str, int]]
     problems: tuple[str, ...]
+    clipped: dict[str, int]
 
 
 def score(
@@ -90,7 +101,7 @@ def score(
                 continue
             owners.append((id, scene))
     used = sorted({scene.name for _, scene in owners})
-    exposures = {name: exposures_of(folder, scenes[name]) for name in used}
+    exposures = {name: exposures_of(folder, scenes[name], anew=True) for name in used}
     units = [
         _Unit(folder, id, scene, names, tuple(run["parts"]), unusable, exposures[scene.name])
         for id, scene in [*owners, *((None, scenes[name]) for name in used)]
@@ -98,21 +109,31 @@ def score(
     wanting = [unit for unit in units if unit.missing()]
     on_progress(0, len(wanting))
     skipped: Counter[tuple[str, str]] = Counter()
+    clipped: Counter[str] = Counter()
     finished = 0
 
-    def heard(unit: int, outcome: tuple[dict[str, str], str]) -> None:
+    def heard(unit: int, outcome: _Outcome) -> None:
         nonlocal finished
-        reasons, problem = outcome
-        skipped.update(reasons.items())
-        if problem:
-            problems.append(problem)
+        skipped.update(outcome.skipped.items())
+        clipped.update(outcome.clipped)
+        if outcome.problem:
+            problems.append(outcome.problem)
         finished += 1
         on_progress(finished, len(wanting))
 
     _score_all(wanting, heard, told)
     return Scored(
-        len(wanting), {name: (why, count) for (name, why), count in skipped.items()}, tuple(problems)
+        len(wanting),
+        {name: (why, count) for (name, why), count in skipped.items()},
+        tuple(problems),
+        dict(clipped),
     )
+
+
+@cache
+def code_of(name: str) -> str:
+    """Digest of the sources that decide a metric's values: where it changes, they are computed anew."""
+    return digest(module_of(metrics.metric(name).function), *SHARED)
 
 
 def _unusable(names: Iterable[str]) -> dict[str, str]:
@@ -129,9 +150,19 @@ def _unusable(names: Iterable[str]) -> dict[str, str]:
     return {}
 
 
+@dataclass(frozen=True)
+class _Outcome:
+    """What came of a unit. skipped: metric → why. problem: what is wrong with the result, if anything. clipped: metric
+    → how many values."""
+
+    skipped: dict[str, str]
+    problem: str
+    clipped: dict[str, int]
+
+
 def _score_all(
     units: Sequence[_Unit],
-    heard: Callable[[int, tuple[dict[str, str], str]], None],
+    heard: Callable[[int, _Outcome], None],
     told: Callable[[str], None],
 ) -> None:
     """Score units, in as many processes as there are cores. heard: of each that is done. Raises RunError."""
@@ -168,7 +199,7 @@ def _one_thread() -> None:
     os.environ["OMP_NUM_THREADS"] = "1"
 
 
-def _scored_one(units: Sequence[_Unit], unit: int, report: Report) -> tuple[dict[str, str], str]:
+def _scored_one(units: Sequence[_Unit], unit: int, report: Report) -> _Outcome:
     return _scored(units[unit])
 
 
@@ -202,10 +233,12 @@ class _Unit:
         known |= {
             metric for part in scores["sequences"].values() for named in part.values() for metric in named
         }
+        codes = scores.get("codes", {})
         return [
             name
             for name in self.names
-            if name not in known and (name not in scores["skipped"] or name not in self.unusable)
+            if (name not in known or codes.get(name) != code_of(name))
+            and (name not in scores["skipped"] or name not in self.unusable)
         ]
 
 
@@ -232,14 +265,16 @@ def _by_sequence(scores: dict[str, Any]) -> dict[str, Any]:
     return {**scores, "sequences": named}
 
 
-def _scored(unit: _Unit) -> tuple[dict[str, str], str]:
-    """Complete a score file; returns metric → why it was skipped, and what is wrong with the result, if anything."""
+def _scored(unit: _Unit) -> _Outcome:
+    """Complete a score file."""
     scores, missing = unit.read(), unit.missing()
     skipped = {name: unit.unusable[name] for name in missing if name in unit.unusable}
-    predicted = _predicted(unit.folder, unit.id) if unit.id is not None else _half(unit.scene)
+    frames = None
+    if unit.id is not None:
+        predicted = _predicted(unit.folder, unit.id)
 
-    def frames(frame: int) -> dict[str, Image]:
-        return {part: image for part, image in predicted(frame).items() if part in unit.parts}
+        def frames(frame: int) -> dict[str, Image]:
+            return {part: image for part, image in predicted(frame).items() if part in unit.parts}
 
     chosen = [metrics.metric(name) for name in missing if name not in skipped]
     try:
@@ -249,9 +284,10 @@ def _scored(unit: _Unit) -> tuple[dict[str, str], str]:
             [d.name for d in chosen if d.inputs == "image"],
             [d.name for d in chosen if d.inputs == "sequence"],
             unit.exposures,
+            unit.parts,
         )
     except GibenchError as problem:
-        return {}, str(problem)
+        return _Outcome({}, str(problem), {})
     for part, values in new["frames"].items():
         scores["frames"].setdefault(part, {}).update(values)
     for part, sequences in new["sequences"].items():
@@ -261,10 +297,22 @@ def _scored(unit: _Unit) -> tuple[dict[str, str], str]:
     scores["skipped"] = {
         name: why for name, why in {**scores["skipped"], **skipped}.items() if name not in new["done"]
     }
-    scores |= {"gibench": gibench.__version__, "exposures": list(unit.exposures)}
+    done = set(new["done"])
+    of_before = {name: count for name, count in scores.get("clipped", {}).items() if name not in done}
+    scores |= {
+        "gibench": gibench.__version__,
+        "exposures": list(unit.exposures),
+        "codes": {
+            **scores.get("codes", {}),
+            EXPOSURES: _exposure_code(),
+            **{n: code_of(n) for n in new["done"]},
+        },
+        "unbiased": sorted({*scores.get("unbiased", ())} - done | {*new["unbiased"]}),
+        "clipped": of_before | new["clipped"],
+    }
     unit.folder.scores.mkdir(exist_ok=True)
     write_whole(unit.folder.score_file(unit.id or unit.scene.name), as_json(_finite(scores)))
-    return skipped, ""
+    return _Outcome(skipped, "", new["clipped"])
 
 
 def _finite(value: Any) -> Any:
@@ -276,10 +324,22 @@ def _finite(value: Any) -> Any:
     return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
-def exposures_of(folder: RunFolder, scene: SceneFiles) -> tuple[float, ...]:
-    """The exposure that each frame is seen under: `reference_exposure`, shared by the frames of a sequence."""
-    known = read_scores(folder, scene.name)
-    if known is not None and len(known.get("exposures", ())) == len(scene):  # older scores have one, or none
+EXPOSURES = "exposures"
+"""What the code of exposures is known by among those of metrics."""
+
+
+def _exposure_code() -> str:
+    return digest("gibench.metrics.tone_map")
+
+
+def exposures_of(folder: RunFolder, scene: SceneFiles, *, anew: bool = False) -> tuple[float, ...]:
+    """The exposure that each frame is seen under: `reference_exposure`, shared by the frames of a sequence.
+
+    That of the scores where there are some. anew: only if the same code found them.
+    """
+    known = read_scores(folder, scene.name) or {}
+    current = not anew or known.get("codes", {}).get(EXPOSURES) == _exposure_code()
+    if current and len(known.get("exposures", ())) == len(scene):  # older scores have one, or none
         return tuple(float(exposure) for exposure in known["exposures"])
     exposures = [0.0] * len(scene)
     stills = [range(frame, frame + 1) for frame in range(len(scene)) if scene.stretch(frame) is None]
@@ -290,66 +350,59 @@ def exposures_of(folder: RunFolder, scene: SceneFiles) -> tuple[float, ...]:
     return tuple(exposures)
 
 
-def reference_parts(scene: SceneFiles, frame: int) -> dict[str, Image]:
-    """References of predictions, (H, W, 3) by part: those whose channels are stored."""
-    first, second = (half_parts(scene, which, frame) for which in (0, 1))
-    return {part: 0.5 * (image + second[part]) for part, image in first.items()}
-
-
-def half_parts(scene: SceneFiles, which: int, frame: int) -> dict[str, Image]:
-    """The same of one of the two renderings of the reference."""
-    there = set(present_channels(scene.halves[which][frame]))
-    parts = {part: channels for part, channels in CHANNELS_OF.items() if there.issuperset(channels)}
-    read = scene.half(which, frame, *dict.fromkeys(c for channels in parts.values() for c in channels))
-    return {part: sum_of([read[channel] for channel in channels]) for part, channels in parts.items()}
-
-
-def sum_of(images: Sequence[Image]) -> Image:
-    """Sum of one image or more."""
-    total = images[0]
-    for image in images[1:]:
-        total = total + image
-    return total
-
-
 def _predicted(folder: RunFolder, id: str) -> Frames:
     files = folder.read_result(id)["files"]
     return lambda frame: predictions.read(folder.root, id, frame, files[f"{frame:04d}.exr"])
 
 
-def _half(scene: SceneFiles) -> Frames:
-    return lambda frame: half_parts(scene, 0, frame)
-
-
 def compute(
-    frames: Frames,
+    frames: Frames | None,
     scene: SceneFiles,
     image: Sequence[str],
     sequence: Sequence[str],
     exposures: Sequence[float],
+    parts: Sequence[str] = tuple(CHANNELS_OF),
 ) -> dict[str, Any]:
     """Compute metrics of all frames of a scene, two frames in memory at a time.
 
+    frames: predictions; None for what the references themselves are wrong by. parts: that are scored.
+
     Returns "frames": part → metric → a value a frame; "sequences": part → name of the sequence → metric → the mean over
-    its steps, with "_prediction" and "_reference" beside (see `evaluate_sequence`); "skipped": metric → why; "done".
+    its steps, with "_prediction" and "_reference" beside (see `evaluate_sequence`); "skipped": metric → why; "done";
+    "unbiased": metrics that are against the truth in all parts; "clipped": of these, metric → how many values stand as
+    0 for an estimate below it.
     """
+    quadratic = [name for name in image if metrics.is_quadratic(name)]
+    biased: set[str] = set()
+    clipped: Counter[str] = Counter()
+    squares: dict[tuple[str, str], list[metrics.Unbiased]] = {}
     values: dict[str, dict[str, list[float]]] = {}
     steps: dict[str, dict[str, dict[str, list[float]]]] = {}
     skipped: dict[str, str] = {}
     before: _Step | None = None
     for number in range(len(scene)):
         stretch = scene.stretch(number) if sequence else None
-        now = _Step(
-            frames(number), reference_parts(scene, number), scene, None if stretch is None else number
-        )
-        exposure = exposures[number]
+        reference, exposure = read_reference(scene, number), exposures[number]
+        predicted = reference.halves[0] if frames is None else frames(number)
+        now = _Step(predicted, reference.parts, scene, None if stretch is None else number)
+        known = reference.truths(exposure) if quadratic else {}
         for part, pred in now.predicted.items():
-            if part not in now.references:
+            if part not in now.references or part not in parts:
                 continue
             if number == 0 and not values:
                 skipped |= _impossible(pred, image)
             possible = [name for name in image if name not in skipped]
-            row = metrics.evaluate(pred, now.references[part], metrics=possible, exposure=exposure)
+            truly = [name for name in quadratic if name in possible and part in known]
+            biased |= {name for name in image if name not in truly}
+            against = [name for name in possible if name not in truly]
+            row = metrics.evaluate(pred, now.references[part], metrics=against, exposure=exposure)
+            for name in truly:
+                if frames is None:
+                    squares.setdefault((part, name), []).append(known[part].error_of_reference(name))
+                    row[name] = float("nan")
+                else:
+                    found = known[part].error(name, pred)
+                    row[name], clipped[name] = found.value, clipped[name] + found.clipped
             for name in possible:
                 values.setdefault(part, {}).setdefault(name, []).append(float(np.float64(row[name])))
             if stretch is not None and scene.before(number) is not None and before is not None:
@@ -357,6 +410,10 @@ def compute(
                     named = steps.setdefault(part, {}).setdefault(stretch.name, {})
                     named.setdefault(name, []).append(value)
         before = now
+    for (part, name), found in squares.items():
+        value = metrics.mean_of(name, found)
+        values[part][name] = [value.value] * len(found)
+        clipped[name] += value.clipped
     if not any(stretch.count > 1 for stretch in scene.sequences):
         skipped |= dict.fromkeys(sequence, "there is no sequence of two frames or more")
     return {
@@ -369,6 +426,8 @@ def compute(
         },
         "skipped": skipped,
         "done": [name for name in [*image, *sequence] if name not in skipped],
+        "unbiased": [name for name in image if name not in biased],
+        "clipped": {name: count for name, count in clipped.items() if count},
     }
 
 

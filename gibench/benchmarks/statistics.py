@@ -28,7 +28,8 @@ class Difference:
     """A method against another on the same frames, first less second.
 
     interval: of the mean difference, 95 %. floor: the difference that the noise of the references alone could explain;
-    NaN where it is not known. verdict: of the first: "better" or "worse" only where the interval excludes zero and the
+    NaN where it is not known, and where the metric is against the truth (`Results.unbiased`), whose noise is in the
+    interval. verdict: of the first: "better" or "worse" only where the interval excludes zero and the
     difference is above the floor.
     """
 
@@ -144,7 +145,8 @@ def difference(first: tuple[Results, str], second: tuple[Results, str], name: st
         )
     values = [table.loc[both].to_numpy().T for table in tables]
     interval = paired_difference(values[0], values[1], both.get_level_values("content").to_numpy())
-    noise = floor(first[0], name, part)
+    truly = all(name in results.unbiased for results, _ in (first, second))
+    noise = float("nan") if truly else floor(first[0], name, part)
     return Difference(
         first[1], second[1], name, part, interval, noise, verdict(interval, noise, METRICS[name].direction)
     )

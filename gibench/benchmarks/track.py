@@ -15,6 +15,7 @@ from gibench.datasets.checked import Name
 from gibench.datasets.errors import RecipeError, nearest
 from gibench.datasets.recipes import Recipe, check_recipe, toml_values
 from gibench.metrics import METRICS
+from gibench.rendering.channels import SAMPLED
 
 Names = Annotated[tuple[str, ...], Field(strict=False)]
 Part = Literal["full", "specular", "indirect"]
@@ -25,6 +26,16 @@ CHANNELS_OF: dict[str, tuple[str, ...]] = {
     "full": ("color",),
     "specular": ("direct_specular", "indirect_specular"),
     "indirect": ("indirect_diffuse", "indirect_specular"),
+}
+
+#: The same of the samples of an image that is denoised beside them.
+SAMPLES_OF: dict[str, tuple[str, ...]] = {
+    part: tuple(
+        name
+        for channel in channels
+        for name in (("emission", *SAMPLED) if channel == "color" else (f"sampled_{channel}",))
+    )
+    for part, channels in CHANNELS_OF.items()
 }
 
 #: Channels that tell which pixels the frame before shows too, for metrics of sequences.

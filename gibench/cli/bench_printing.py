@@ -81,6 +81,10 @@ def print_scored(scored: Scored) -> None:
     """Say which metrics could not be computed, and why."""
     for name, (why, count) in scored.skipped.items():
         _row("left out", f"{name} of {count} results: {why}")
+    for name, count in scored.clipped.items():
+        _row(
+            "noise", f"{count} values of {name} came out below 0, as those of good images may, and stand as 0"
+        )
     for problem in scored.problems:
         say(problem, err=True)
 
@@ -119,8 +123,12 @@ def print_board(root: Path) -> None:
     if several:
         say("Results of several machines: compare times within the rows of one machine alone.")
     noise = statistics.floor(results, name, "full")
+    truly = name in results.unbiased
     if noise == noise:
-        say(f"{'(noise of the references)':<{LABEL}} {noise:9.4f}")
+        what = "(the references themselves)" if truly else "(noise of the references)"
+        say(f"{what:<{LABEL}} {noise:9.4f}")
+    if truly:
+        say(f"{name} is against the truth, by samples of the references that are not denoised.")
 
 
 def print_results(root: Path) -> None:

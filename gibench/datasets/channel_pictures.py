@@ -24,7 +24,7 @@ def picture_of(channel: Channel, values: NDArray[Any], exposure: float) -> tuple
     if channel.name == "color_se":
         own = float(reference_exposure(values))
         return tone_map(values, own), f"exposure x{own / exposure:.0f}"
-    if channel.set == "radiance" or channel.name in CUES:
+    if channel.set in ("radiance", "samples") or channel.name in CUES:
         return tone_map(values, exposure), ""
     if channel.dtype == "uint":
         ids = values[..., 0]

@@ -109,7 +109,7 @@ def stored_types(arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
 
 def is_radiance(channel: Channel) -> bool:
     """Whether the channel holds light, which is never negative."""
-    return channel.set == "radiance" or channel.name in CUES
+    return channel.set in ("radiance", "samples") or channel.name in CUES
 
 
 def _refuse_impossible(channel: Channel, values: NDArray[Any]) -> None:

@@ -48,6 +48,12 @@ from gibench.metrics.statistics import (
     paired_difference as paired_difference,
 )
 from gibench.metrics.tone_map import reference_exposure as reference_exposure, tone_map as tone_map
+from gibench.metrics.unbiased import (
+    Truth as Truth,
+    Unbiased as Unbiased,
+    is_quadratic as is_quadratic,
+    mean_of as mean_of,
+)
 
 # isort: on
 

@@ -43,6 +43,11 @@ def relative_squared_error(pred: Float64, ref: Float64) -> Float64:
     return difference * difference / (ref * ref + EPSILON)
 
 
+def relative_weight(ref: Float64) -> Float64:
+    """Give what `relative_squared_error` multiplies differences by before it squares them."""
+    return np.asarray(1 / np.hypot(ref, math.sqrt(EPSILON)))
+
+
 def symmetric_relative_error(pred: Float64, ref: Float64) -> Float64:
     """Divide the size of each difference by the sum of both values, which are not negative."""
     return np.abs(pred - ref) / (pred + ref + EPSILON)
@@ -56,6 +61,7 @@ def symmetric_relative_error(pred: Float64, ref: Float64) -> Float64:
     units="(W·m⁻²·sr⁻¹)²",
     values="linear",
     reference="Wang & Bovik 2009, IEEE Signal Processing Magazine 26(1)",
+    of_mean_square=float,
 )
 def mse(pred: ArrayLike, ref: ArrayLike, *, map: bool = False, mask: ArrayLike | None = None) -> MetricValue:
     """Mean squared error, mean (p − r)² over the pixels that count and their channels.
@@ -97,6 +103,7 @@ def mse(pred: ArrayLike, ref: ArrayLike, *, map: bool = False, mask: ArrayLike |
     units="W·m⁻²·sr⁻¹",
     values="linear",
     reference="Wang & Bovik 2009, IEEE Signal Processing Magazine 26(1)",
+    of_mean_square=math.sqrt,
 )
 def rmse(pred: ArrayLike, ref: ArrayLike, *, map: bool = False, mask: ArrayLike | None = None) -> MetricValue:
     """Root-mean-square error, √mean (p − r)²: `mse` in the unit of radiance.
@@ -171,6 +178,8 @@ def mae(pred: ArrayLike, ref: ArrayLike, *, map: bool = False, mask: ArrayLike |
     units="1",
     values="linear",
     reference="Rousselle, Knaus & Zwicker 2011, ACM TOG 30(6)",
+    of_mean_square=float,
+    weight=relative_weight,
 )
 def relmse(
     pred: ArrayLike, ref: ArrayLike, *, map: bool = False, mask: ArrayLike | None = None

@@ -12,6 +12,11 @@ from gibench.metrics.pixelwise import mean_error
 from gibench.metrics.registry import register
 
 
+def decibels_of(mean_square: float) -> float:
+    """Turn the mean squared error of display values in [0, 1] into decibels."""
+    return math.inf if mean_square == 0 else -10 * math.log10(mean_square)
+
+
 @register(
     name="psnr",
     direction="higher",
@@ -20,6 +25,7 @@ from gibench.metrics.registry import register
     units="dB",
     values="display",
     reference="Wang & Bovik 2009, IEEE Signal Processing Magazine 26(1)",
+    of_mean_square=decibels_of,
 )
 def psnr(
     pred: ArrayLike, ref: ArrayLike, *, data_range: float = 1.0, mask: ArrayLike | None = None

@@ -28,6 +28,10 @@ class Descriptor:
         inputs: a single "image" (or a batch), or a "sequence" of frames with their motion.
         reference: the publication that defines it.
         options: the keyword arguments that tell this metric from others of the same function.
+        of_mean_square: of a quadratic metric, its value from the mean of squared differences, which samples of the
+            truth give without bias (`gibench.metrics.unbiased`).
+        weight: of linear radiance, what differences are multiplied by before they are squared, from the reference; None
+            for 1.
         derived: the metric whose value alone decides this one's, and how; `evaluate` computes that one once.
     """
 
@@ -42,6 +46,8 @@ class Descriptor:
     reference: str
     options: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
     derived: tuple[str, Callable[[Any], Any]] | None = None
+    of_mean_square: Callable[[float], float] | None = None
+    weight: Callable[[Any], Any] | None = None
 
     def __call__(self, *arguments: Any, **keywords: Any) -> Any:
         """Compute the metric with its own options."""

@@ -28,6 +28,7 @@ def error_of(decibels: MetricValue) -> MetricValue:
     values="display",
     reference="Wang & Bovik 2009, IEEE Signal Processing Magazine 26(1)",
     derived=("psnr", error_of),
+    of_mean_square=math.sqrt,
 )
 def rmse_display(pred: ArrayLike, ref: ArrayLike, *, mask: ArrayLike | None = None) -> MetricValue:
     """Root-mean-square error of display values, √mean (p − r)².

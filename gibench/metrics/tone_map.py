@@ -96,6 +96,14 @@ def tone_map(radiance: ArrayLike, exposure: ArrayLike) -> FloatArray:
     return srgb_from_linear(exposed)
 
 
+def display_slope(radiance: NDArray[np.float64], exposure: float) -> NDArray[np.float64]:
+    """Give the derivative of `tone_map` by radiance, of any shape; 0 where it clips."""
+    exposed = radiance * exposure
+    power = np.power(np.maximum(exposed, 0.0031308), 1 / 2.4 - 1)
+    slope = np.where(exposed <= 0.0031308, 12.92, 1.055 / 2.4 * power)
+    return np.where(exposed < 1, exposure * slope, 0.0)
+
+
 def srgb_from_linear(linear: FloatArray) -> FloatArray:
     """Apply the sRGB transfer function to values in [0, 1] of any shape (IEC 61966-2-1:1999, section 5.2)."""
     root = np.power(linear, linear.dtype.type(1 / 2.4))

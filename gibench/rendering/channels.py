@@ -59,6 +59,12 @@ CHANNELS: dict[str, Channel] = {
             "indirect_specular", 3, "half", _RADIANCE, "depth 2 and more, any other lobe first", "radiance"
         ),
         Channel("color_se", 3, "half", _RADIANCE, "standard error of color, from the samples", "radiance"),
+        *(
+            Channel(
+                f"sampled_{part}", 3, "half", _RADIANCE, f"{part} as it was sampled, not denoised", "samples"
+            )
+            for part in PARTS[1:]
+        ),
         Channel("position", 3, "float", "m", "first hit, world space", "surface"),
         Channel("normal", 3, "float", "1", "shading normal towards the viewer, world space", "surface"),
         Channel(
@@ -97,6 +103,9 @@ CHANNELS: dict[str, Channel] = {
         Channel("radiance_cue_3", 3, "half", _RADIANCE, f"{_CUE} a white one of GGX alpha 0.34", "lighting"),
     )
 }
+
+SAMPLED = {f"sampled_{part}": part for part in PARTS[1:]}
+"""Channels that keep the samples of a part beside its denoised image. Emission is not denoised, and needs none."""
 
 CUES = ("radiance_cue_0", "radiance_cue_1", "radiance_cue_2", "radiance_cue_3")
 """Channels that are sampled like radiance, but for materials that stand in for the scene's (Gao et al. 2022)."""

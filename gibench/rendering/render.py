@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gibench.rendering.camera import PinholeCamera, check_resolution
-from gibench.rendering.channels import CUES, PARTS, SETS, resolve
+from gibench.rendering.channels import CUES, PARTS, SAMPLED, SETS, resolve
 from gibench.rendering.denoise import denoise_part, mean_change
 from gibench.rendering.estimate import (
     GUIDES,
@@ -53,6 +53,7 @@ def _radiance(
     estimate: Estimate, names: Sequence[str], resolution: tuple[int, int], denoise: bool
 ) -> tuple[dict[str, NDArray[Any]], float]:
     parts = {name: frame_of(estimate.part(name), resolution) for name in PARTS}
+    sampled = {name: parts[part] for name, part in SAMPLED.items()}
     change = 0.0
     if denoise:
         guides = {name: frame_of(estimate.part(name), resolution) for name in ("albedo", "normal")}
@@ -61,7 +62,7 @@ def _radiance(
         whole = float(sum(part.mean((0, 1), dtype=np.float64) for part in parts.values()).max())
         change = max((mean_change(clean[name], parts[name], whole=whole) for name in clean), key=abs)
         parts |= clean
-    result: dict[str, NDArray[Any]] = dict(parts)
+    result: dict[str, NDArray[Any]] = parts | sampled
     color = np.zeros_like(parts["emission"])
     for name in PARTS:
         color += parts[name]
@@ -98,9 +99,9 @@ def render_frame(
     start = time.perf_counter()
     width, height = check_resolution(resolution)
     names = resolve(channels)
-    radiance = [n for n in names if n in SETS["radiance"]]
+    radiance = [n for n in names if n in SETS["radiance"] or n in SAMPLED]
     cues = [n for n in names if n in CUES]
-    rest = [n for n in names if n not in SETS["radiance"] and n not in CUES]
+    rest = [n for n in names if n not in radiance and n not in CUES]
     arrays: dict[str, NDArray[Any]] = {}
     estimate = Estimate(0, 0)
     denoise_seconds = denoise_change = 0.0

@@ -13,7 +13,7 @@ from gibench.rendering.channels import SETS
 from gibench.rendering.render import RenderedFrame, render_frame
 from gibench.rendering.scene import Scene
 
-SURFACE_SETS = tuple(name for name in SETS if name not in ("radiance", "lighting"))
+SURFACE_SETS = tuple(name for name in SETS if name not in ("radiance", "samples", "lighting"))
 """All channels that are not radiance."""
 
 POINT = 1e-5

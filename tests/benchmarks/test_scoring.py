@@ -10,11 +10,17 @@ import numpy as np
 import pytest
 
 from gibench import metrics
+from gibench.baselines import sources
+from gibench.baselines.sources import module_of
 from gibench.benchmarks import scoring
 from gibench.benchmarks.errors import ResultsError, RunError
+from gibench.benchmarks.references import half_parts, reference_parts
 from gibench.benchmarks.scenes import scenes_in
-from gibench.benchmarks.scoring import compute, half_parts, reference_parts, score
+from gibench.benchmarks.scoring import compute, score
+from gibench.benchmarks.track import MOVING
 from gibench.datasets import pool
+from gibench.datasets.exr import encode
+from gibench.rendering.channels import PARTS, SAMPLED
 
 SEQUENCE = ["warping_error", "temporal_difference", "mabd"]
 
@@ -242,3 +248,97 @@ def test_a_process_that_hangs_is_given_up_and_its_result_scored_again(copy, tmp_
     assert len(remarks) == times
     assert "its worker hangs: it has not computed anything for 3 s; once more in a new one" in remarks[0]
     assert {path.name: path.read_bytes() for path in copy.scores.iterdir()} == scores
+
+
+def test_a_metric_whose_code_changed_is_computed_anew(copy, monkeypatch):
+    """A mended metric beside values of before would be two metrics of one name on one board."""
+    assert score(copy).done == 0
+    before = scoring.code_of
+    monkeypatch.setattr(scoring, "default_threads", lambda workers: 1)
+    monkeypatch.setattr(scoring, "code_of", lambda name: before(name) if name != "dssim" else "0" * 16)
+    asked = []
+    monkeypatch.setattr(scoring, "compute", lambda *a: asked.append(a[2:4]) or compute(*a))
+    assert score(copy).done == 7
+    assert asked == [(["dssim"], [])] * 7
+    assert json.loads(copy.score_file(copy.ids()[0]).read_text())["codes"]["dssim"] == "0" * 16
+    assert score(copy).done == 0
+
+
+@pytest.mark.parametrize("name", ["rmse", "dssim", "warping_error"])
+def test_the_key_of_a_score_is_of_all_that_decides_it(name):
+    sources_of_it = sources.sources(module_of(metrics.metric(name).function))
+    assert metrics.metric(name).function.__module__ in sources_of_it
+    shared = {module for one in scoring.SHARED for module in sources.sources(one)}
+    assert {"gibench.metrics.tone_map", "gibench.metrics.unbiased", "gibench.metrics.reprojection"} <= shared
+
+
+@pytest.fixture
+def noisy_scene(scene, tmp_path):
+    """The scene with references that were denoised, badly, beside samples that were not, and the truth behind both."""
+    rng = np.random.default_rng(1)
+    truth, halves = {}, ([], [])
+    for frame in range(len(scene)):
+        arrays = scene.half(0, frame, *PARTS, *MOVING)
+        truth[frame] = {name: np.maximum(arrays[name], 0.05).astype(np.float32) for name in PARTS}
+        for which in (0, 1):
+            noise = {
+                name: rng.gamma(20, 0.05, truth[frame][name].shape).astype(np.float32)
+                for name in SAMPLED.values()
+            }
+            sampled = {name: truth[frame][part] * noise[part] for name, part in SAMPLED.items()}
+            # Too dark, and what noise is left is that of the samples.
+            shown = {part: 0.9 * truth[frame][part] * noise[part] ** 0.2 for part in SAMPLED.values()}
+            file = {**arrays, **truth[frame], **shown, **sampled}
+            file["color"] = sum(file[part] for part in PARTS)
+            path = tmp_path / f"{which}-{frame}.exr"
+            path.write_bytes(encode(file))
+            halves[which].append(path)
+    return replace(scene, halves=tuple(map(tuple, halves))), truth
+
+
+def test_quadratic_metrics_are_against_the_truth_where_samples_are_kept(noisy_scene):
+    """A darker reference flatters darker images; its samples tell the true error, of images and of itself."""
+    scene, truth = noisy_scene
+    names, full = ["rmse", "mse", "flip"], [sum(truth[frame][part] for part in PARTS) for frame in range(3)]
+    for shade in (1.1, 0.8):
+        found = compute(
+            lambda frame, shade=shade: {"full": (shade * full[frame]).astype(np.float32)},
+            scene,
+            names,
+            [],
+            [1.0] * 3,
+        )
+        assert found["unbiased"] == ["rmse", "mse"]
+        assert not found["clipped"]
+        wrong = []
+        for frame in range(3):
+            image = (shade * full[frame]).astype(np.float32)
+            true = metrics.evaluate(image, full[frame], metrics=["mse"])["mse"]
+            assert found["frames"]["full"]["mse"][frame] == pytest.approx(true, rel=0.25)
+            assert found["frames"]["full"]["rmse"][frame] == found["frames"]["full"]["mse"][frame] ** 0.5
+            reference = reference_parts(scene, frame)["full"]
+            wrong.append(metrics.evaluate(image, reference, metrics=["mse"])["mse"] / true)
+        assert np.mean(wrong) > 1.5 or np.mean(wrong) < 0.6
+    floor = compute(None, scene, names, [], [1.0] * 3)
+    true = np.mean(
+        [
+            metrics.evaluate(reference_parts(scene, f)["full"], full[f], metrics=["mse"])["mse"]
+            for f in range(3)
+        ]
+    )
+    assert floor["frames"]["full"]["mse"] == [pytest.approx(true, rel=0.25)] * 3
+    by_halves = np.mean(
+        [
+            metrics.evaluate(
+                half_parts(scene, 0, f)["full"], reference_parts(scene, f)["full"], metrics=["mse"]
+            )["mse"]
+            for f in range(3)
+        ]
+    )
+    assert by_halves < 0.5 * true
+
+
+def test_references_without_samples_are_scored_as_before(scene):
+    found = compute(noisy(scene), scene, ["rmse", "dssim"], [], [1.0] * 3)
+    assert found["unbiased"] == []
+    assert found["clipped"] == {}

@@ -7,7 +7,15 @@ from gibench.rendering import channels
 
 def test_sets_hold_what_the_contract_says():
     assert channels.SETS["radiance"] == ("color", *channels.PARTS, "color_se")
-    assert set(channels.SETS) == {"radiance", "surface", "reflection", "curvature", "motion", "lighting"}
+    assert set(channels.SETS) == {
+        "radiance",
+        "samples",
+        "surface",
+        "reflection",
+        "curvature",
+        "motion",
+        "lighting",
+    }
     assert sum(len(names) for names in channels.SETS.values()) == len(channels.CHANNELS)
 
 

@@ -18,7 +18,7 @@ from gibench.benchmarks.report.source import ReportSource
 from gibench.benchmarks.report.summary import Summary
 from gibench.benchmarks.report.tables import stage_times
 from gibench.benchmarks.report.trainings import TrainingCurve, trainings
-from gibench.benchmarks.report.wording import metric_title
+from gibench.benchmarks.report.wording import against, metric_title
 from gibench.datasets.files import write_whole
 from gibench.metrics import METRICS
 
@@ -58,6 +58,7 @@ def write_page(source: ReportSource, summary: Summary, out: Path) -> Path:
         scripts=[(assets / name).read_text(encoding="utf-8") for name in SCRIPTS],
         data=_inline(page_data(source, summary)),
         parts={part: part_title(part) for part in summary.parts},
+        against=against(_metrics_of(source, summary), summary.unbiased),
     )
     path = out / "index.html"
     write_whole(path, text.encode())
@@ -89,9 +90,7 @@ def page_data(source: ReportSource, summary: Summary) -> dict[str, Any]:
                 "higher": METRICS[name].direction == "higher",
                 "inTime": METRICS[name].inputs == "sequence",
             }
-            # As the track lists them: the board opens with its first.
-            for name in dict.fromkeys((*source.run.get("metrics", ()), *METRICS))
-            if name in set(summary.scores["metric"])
+            for name in _metrics_of(source, summary)
         ],
         "stages": list(stage_times(source, summary).columns),
         "against": summary.against,
@@ -100,6 +99,12 @@ def page_data(source: ReportSource, summary: Summary) -> dict[str, Any]:
         "results": _results(source, summary, scenes, number_of),
         "trainings": [_training(curve) for curve in trainings(source, summary)],
     }
+
+
+def _metrics_of(source: ReportSource, summary: Summary) -> list[str]:
+    """As the track lists them: the board opens with its first."""
+    scored = set(summary.scores["metric"])
+    return [name for name in dict.fromkeys((*source.run.get("metrics", ()), *METRICS)) if name in scored]
 
 
 def _training(curve: TrainingCurve) -> dict[str, Any]:

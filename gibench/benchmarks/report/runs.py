@@ -65,9 +65,9 @@ class Runs:
     def _alone(self) -> bool:
         return len(self._runs) == 1
 
-    @property
+    @cached_property
     def run(self) -> Mapping[str, Any]:
-        """Facts common to the runs, and those that differ, side by side."""
+        """Facts common to the runs, and those that differ, side by side; "unbiased": see `Results.unbiased`."""
         facts = [run.run for run in self._runs]
 
         def both(key: str) -> str:
@@ -77,6 +77,12 @@ class Runs:
             key: list(dict.fromkeys(name for one in facts for name in one[key]))
             for key in ("metrics", "sequence_metrics", "parts")
         }
+        scored = {name for run in self._runs for name in run.frames["metric"].unique()}
+        unbiased = [
+            name
+            for name in scored
+            if all(name in run.unbiased for run in self._runs if name in set(run.frames["metric"]))
+        ]
         machines = {id: machine for one in facts for id, machine in one.get("machines", {}).items()}
         created = max(str(one.get("created", "")) for one in facts)
         return {
@@ -86,6 +92,7 @@ class Runs:
             "seed": both("seed"),
             "created": created,
             "machines": machines,
+            "unbiased": sorted(unbiased),
         }
 
     @cached_property

@@ -28,11 +28,11 @@ class ReportError(GibenchError):
 class ReportSource(Protocol):
     """A run's tables, and its images when they are asked for.
 
-    run: track, preset, seed, machine (a mapping), created. results: a row a result, that is (scene, method, knobs,
-    seed). stages: milliseconds per frame by result and stage. frames: metric values by result, frame and part.
-    sequences: values of metrics in time by result and part. floor: what each metric says of a second,
-    independent reference, by scene, frame and part. curves: looks at the held-out error of trainings, a row a look.
-    paths: which frames of a scene follow each other.
+    run: track, preset, seed, machine (a mapping), created, unbiased (metrics against the truth). results: a row a
+    result, that is (scene, method, knobs, seed). stages: milliseconds per frame by result and stage. frames: metric
+    values by result, frame and part. sequences: values of metrics in time by result and part. floor: what each
+    metric says of a second, independent reference, by scene, frame and part. curves: looks at the held-out error of
+    trainings, a row a look. paths: which frames of a scene follow each other.
     """
 
     @property

@@ -39,6 +39,7 @@ class Summary:
     floor: values of the reference's floor by scene, frame, part and metric, frame -1 for metrics in time.
     paths: the sequence of each scene and frame, "" for a still.
     against: the label that differences are taken against, None for none.
+    unbiased: metrics that are against the truth (`gibench.benchmarks.results.Results.unbiased`).
     """
 
     entries: pd.DataFrame
@@ -48,6 +49,7 @@ class Summary:
     floor: pd.DataFrame
     paths: pd.DataFrame
     against: str | None
+    unbiased: tuple[str, ...]
 
     @property
     def machines(self) -> list[str]:
@@ -98,8 +100,9 @@ def summarise(source: ReportSource, *, against: str | None = None) -> Summary:
     by_frame = _with_time(source.floor).groupby(["scene", "frame", "part", "metric"])["value"]
     floor = by_frame.mean().reset_index()
     entries = _entries(results)
-    scores = pd.DataFrame(_scores(entries, by_seed, floor, chosen), columns=_SCORE_COLUMNS)
-    return Summary(entries, results, values, scores, floor, source.paths, chosen)
+    unbiased = tuple(source.run.get("unbiased", ()))
+    scores = pd.DataFrame(_scores(entries, by_seed, floor, chosen, unbiased), columns=_SCORE_COLUMNS)
+    return Summary(entries, results, values, scores, floor, source.paths, chosen, unbiased)
 
 
 def machine_names(run: Mapping[str, Any], ids: Sequence[str]) -> dict[str, str]:
@@ -216,7 +219,11 @@ def _knobs(text: Any) -> dict[str, Any]:
 
 
 def _scores(
-    entries: pd.DataFrame, values: pd.DataFrame, floor: pd.DataFrame, against: str | None
+    entries: pd.DataFrame,
+    values: pd.DataFrame,
+    floor: pd.DataFrame,
+    against: str | None,
+    unbiased: Sequence[str],
 ) -> list[dict[str, Any]]:
     rows = []
     for (part, metric), table in values.groupby(["part", "metric"], sort=True):
@@ -238,7 +245,9 @@ def _scores(
             other = _opponent(entries, entry, against)
             if other in grid.columns.unique("entry"):
                 opponent = grid[other].to_numpy()
-                row |= _difference(seeds, opponent, rooms, METRICS[str(metric)], float(level))
+                # What is against the truth does not depend on what the reference has wrong.
+                doubt = math.nan if metric in unbiased else float(level)
+                row |= _difference(seeds, opponent, rooms, METRICS[str(metric)], doubt)
             rows.append(row)
     return rows
 

@@ -17,7 +17,7 @@ from gibench.benchmarks.report.csv_files import short_reason
 from gibench.benchmarks.report.runs import APART, image_part, part_title
 from gibench.benchmarks.report.source import PREPARATION, ReportSource
 from gibench.benchmarks.report.summary import Summary
-from gibench.benchmarks.report.wording import MISSING, metric_title, number, printable, seconds, size
+from gibench.benchmarks.report.wording import MISSING, against, metric_title, number, printable, seconds, size
 from gibench.datasets.files import write_whole
 from gibench.metrics import METRICS
 
@@ -133,7 +133,7 @@ def errors(summary: Summary, track: str, part: str) -> Table:
     groups.append((None, [[Cell("noise floor of the reference"), *floors]]))
     caption = (
         f"{part_title(part)}, track {track}: means over all rooms and their 95 % intervals over rooms and seeds. "
-        "The best of a column is bold. "
+        f"The best of a column is bold. {against(metrics, summary.unbiased)} "
     ) + _directions(metrics)
     return Table(caption, ["Method", *map(metric_title, metrics)], groups)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection, Iterable
 
 _TITLES = {
     "rmse": "RMSE",
@@ -36,6 +37,17 @@ def printable(text: str) -> str:
 def metric_title(name: str) -> str:
     """Name a metric as its papers do."""
     return _TITLES.get(name, name)
+
+
+def against(metrics: Iterable[str], unbiased: Collection[str]) -> str:
+    """Say which of some metrics are against the truth, and which against the reference."""
+    chosen = list(metrics)
+    truly = [metric_title(name) for name in chosen if name in unbiased]
+    others = [metric_title(name) for name in chosen if name not in unbiased]
+    if not truly:
+        return "All metrics are against the reference."
+    told = f"Without bias against the truth, by samples that are not denoised: {', '.join(truly)}."
+    return told + (f" Against the reference: {', '.join(others)}." if others else "")
 
 
 def number(value: float, digits: int = 3) -> str:
