@@ -410,10 +410,10 @@ def compute(
                     named = steps.setdefault(part, {}).setdefault(stretch.name, {})
                     named.setdefault(name, []).append(value)
         before = now
-    for (part, name), found in squares.items():
-        value = metrics.mean_of(name, found)
-        values[part][name] = [value.value] * len(found)
-        clipped[name] += value.clipped
+    for (part, name), of_frames in squares.items():
+        together = metrics.mean_of(name, of_frames)
+        values[part][name] = [together.value] * len(of_frames)
+        clipped[name] += together.clipped
     if not any(stretch.count > 1 for stretch in scene.sequences):
         skipped |= dict.fromkeys(sequence, "there is no sequence of two frames or more")
     return {
