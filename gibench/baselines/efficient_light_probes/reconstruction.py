@@ -17,7 +17,7 @@ from gibench.baselines.efficient_light_probes.implementation import ReflectionSe
 from gibench.baselines.efficient_light_probes.temporal import DECAY, accumulated, reprojected
 from gibench.baselines.efficient_light_probes.training import Plan, trained_network
 from gibench.baselines.first_hits import hits_of_rays
-from gibench.baselines.image_to_image.device_frames import as_image, torch_device
+from gibench.baselines.image_to_image.device_frames import as_image
 from gibench.baselines.method import Prediction, Setting, Site, View
 from gibench.baselines.replay import Replay, camera_arrays, ray_generator
 from gibench.baselines.stages import Stages

@@ -13,15 +13,11 @@ from torch import Tensor
 
 from gibench.baselines.image_to_image.frames import Images
 from gibench.baselines.replay import Replay, camera_arrays
+from gibench.rendering.backend import torch_device
 from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.channels import SETS
 from gibench.rendering.gbuffer import surface_arrays
 from gibench.rendering.scene import Scene
-
-
-def torch_device() -> str:
-    """Where torch computes: on the renderer's device."""
-    return "cuda" if dr.backend_v(mi.Float) == dr.JitBackend.CUDA else "cpu"
 
 
 def as_image(values: Any, resolution: tuple[int, int], grid: int = 1) -> Tensor:

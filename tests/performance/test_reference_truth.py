@@ -1,0 +1,137 @@
+"""How far references are from the truth, whether the floor says so, and what scoring against them did to methods.
+
+Two renderings of many more samples stand for the truth and share nothing with the references: errors against it have no
+bias (`gibench.metrics.unbiased`), whoever computes them. Rooms of the preset `cpu`, and scene files that are at hand.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gibench import metrics
+from gibench.rendering.backend import select_variant
+from gibench.rendering.channels import PARTS
+from gibench.rendering.denoise import denoise, denoise_part
+from gibench.rendering.estimate import estimate_radiance, frame_of
+
+pytestmark = pytest.mark.performance
+
+ROOMS = tuple(map(int, os.environ.get("GIBENCH_TRUTH_ROOMS", "0,1,2,3").split(",")))
+SCENES = Path(os.environ.get("GIBENCH_EXTERNAL", "../shared")) / "scenes"
+RESOLUTION = tuple(map(int, os.environ.get("GIBENCH_TRUTH_RESOLUTION", "160,90").split(",")))
+TRUTH_SPP = int(os.environ.get("GIBENCH_TRUTH_SPP", "4096"))
+"""Of each of the two renderings of the truth."""
+
+SPP = 256
+METHODS = (8, 32)
+"""Samples a pixel of path tracing that is denoised as a whole."""
+
+STEP = 8
+"""Of the path whose frame is rendered."""
+
+NAMES = ("relmse", "rmse_display")
+
+
+def frames():
+    """Name, recipe, number of the room and of the view."""
+    from gibench.benchmarks.track import load_track
+
+    preset = load_track("walkthrough").preset("cpu")
+    size = {"resolution": RESOLUTION}
+    recipe = preset.recipe("reference", max(ROOMS) + 1).model_copy(update=size)
+    for room in ROOMS:
+        yield f"room {room}", recipe, room, recipe.views + STEP
+    for file in sorted(SCENES.glob("*/scene.xml")):
+        scene = preset.recipe("reference", 1, {"scenes": [str(file)], "allow_missing": True})
+        yield file.parent.name, scene.model_copy(update=size), 0, 0
+
+
+class Rendered:
+    """Means over the samples of a pixel: parts and guides, (H, W, 3)."""
+
+    def __init__(self, loaded, camera, spp, seed):
+        depth = loaded.recipe.max_depth
+        found = estimate_radiance(
+            loaded.scene, camera, RESOLUTION, spp=spp, seed=seed, max_depth=depth, guides=True
+        )
+        self.parts = {name: frame_of(found.part(name), RESOLUTION) for name in PARTS}
+        self.guides = {name: frame_of(found.part(name), RESOLUTION) for name in ("albedo", "normal")}
+
+    @property
+    def color(self):
+        return sum(self.parts.values())
+
+    @property
+    def denoised(self):
+        clean = [
+            denoise_part(image, **self.guides) for name, image in self.parts.items() if name != "emission"
+        ]
+        return self.parts["emission"] + sum(clean)
+
+
+def measured(loaded, camera):
+    """Mean squares of one frame, by metric and what they are of."""
+    halves = [Rendered(loaded, camera, SPP, 1000 + which) for which in (0, 1)]
+    clean = tuple(half.denoised for half in halves)
+    reference = 0.5 * (clean[0] + clean[1])
+    exposure = float(metrics.reference_exposure(reference))
+    board = metrics.Truth(tuple(half.color for half in halves), clean, exposure)
+    samples = tuple(Rendered(loaded, camera, TRUTH_SPP, 5000 + which).color for which in (0, 1))
+    truth = metrics.Truth(samples, clean, exposure)
+    rows = {}
+    for name in NAMES:
+        rows[name, "reference"] = truth.error(name, reference).mean_square
+        rows[name, "floor"] = board.error_of_reference(name).mean_square
+        half = metrics.evaluate(clean[0], reference, metrics=[name], exposure=exposure)[name]
+        rows[name, "halves"] = half**2 if name == "rmse_display" else half
+    for spp in METHODS:
+        traced = Rendered(loaded, camera, spp, 77 + spp)
+        image = denoise(traced.color, **traced.guides)
+        for name in NAMES:
+            rows[name, spp, "true"] = truth.error(name, image).mean_square
+            rows[name, spp, "board"] = board.error(name, image).mean_square
+            against = metrics.evaluate(image, reference, metrics=[name], exposure=exposure)[name]
+            rows[name, spp, "reference"] = against**2 if name == "rmse_display" else against
+    return rows
+
+
+def test_references_against_the_truth(tmp_path):
+    from gibench.datasets.room_making import LoadedRoom, sampled_room, written_room
+    from gibench.generators.shots import shot_of
+
+    select_variant("auto")
+    found = {}
+    for name, recipe, room, view in frames():
+        built = sampled_room(recipe, room)
+        folder = tmp_path / name.replace(" ", "-")
+        written_room(built, folder, recipe)
+        found[name] = measured(LoadedRoom.of(recipe, built, folder), shot_of(built, view).camera)
+        told(name, found[name])
+    mean = {key: float(np.mean([rows[key] for rows in found.values()])) for key in next(iter(found.values()))}
+    told(f"mean of {len(found)} frames", mean)
+    for name in NAMES:
+        # The bounds of a board, which has some ninety frames of six times as many pixels, with the noise of these few.
+        assert 0.5 < mean[name, "floor"] / mean[name, "reference"] < 2
+        for spp in METHODS:
+            assert abs(mean[name, spp, "board"] / mean[name, spp, "true"] - 1) < 0.15
+
+
+def told(name, rows):
+    print(f"\n{name}:")
+    for metric in NAMES:
+        true = rows[metric, "reference"]
+        print(
+            f"  {metric}: reference {true:.3g}, floor {rows[metric, 'floor'] / true:.2f} of it, difference of halves "
+            f"{rows[metric, 'halves'] / true:.2f}"
+        )
+        for spp in METHODS:
+            error = rows[metric, spp, "true"]
+            board, against = (rows[metric, spp, of] / error - 1 for of in ("board", "reference"))
+            print(
+                f"    denoised path tracing, {spp} samples: {error:.3g}; the board says {board:+.1%}, the reference "
+                f"{against:+.1%}; the reference's own error is {true / error:.2f} of it"
+            )
