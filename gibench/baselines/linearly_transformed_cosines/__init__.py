@@ -6,7 +6,7 @@ from gibench.baselines.method import Knob, Method
 
 SHADOWS = (
     Knob("shadow_rays", 4, (1, 2, 4, 8, 16), "towards the light, for each camera ray"),
-    Knob("rays", 1, (1, 4), "camera rays a pixel, on a square grid: antialiasing"),
+    Knob("rays", 4, (1, 4), "camera rays a pixel, on a square grid: antialiasing"),
 )
 
 METHOD = Method(

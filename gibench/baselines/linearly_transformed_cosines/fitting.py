@@ -39,7 +39,7 @@ neighbours that divided it differently could not be interpolated."""
 
 @dataclass(frozen=True)
 class Lobe:
-    """A GGX lobe with the reflectance 1 seen from one direction, whose azimuth is 0, at N directions that are drawn once.
+    """A GGX lobe with the reflectance 1 seen from one direction, whose azimuth is 0, at N directions.
 
     directions: (N, 3). values: of the lobe, cosine included, sr⁻¹. weights: 1 over density, over how many were drawn.
     schlick: (1 − wh·wi)⁵.

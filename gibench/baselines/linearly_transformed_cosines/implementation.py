@@ -71,7 +71,9 @@ class RectangleLight:
             )
         with stages.stage("filtering"), tracing():
             colors = {name: color for name, (color, _) in lobes.items()}
-            diffuse, specular, cues = _shadowed(light, colors, sums, disagreement, guides, mirrored, *resolution)
+            diffuse, specular, cues = _shadowed(
+                light, colors, sums, disagreement, guides, mirrored, *resolution
+            )
         return Lit(emission, diffuse, specular, dict(zip(CUES, cues, strict=False)), surfaces)
 
 
@@ -91,7 +93,7 @@ def area_light(view: View, method: str) -> AreaLight:
     area = view.shot.lighting.area
     if area is None:
         raise MethodError(
-            f"{method} is for frames that an area light lights alone, and this one has {view.shot.lighting.kind} light: "
+            f"{method} is for frames under an area light alone, and this one has {view.shot.lighting.kind} light: "
             "run it on the track moving-light"
         )
     return area

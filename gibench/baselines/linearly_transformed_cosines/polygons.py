@@ -34,9 +34,7 @@ class Edge:
 def outline(corners: Sequence[Any], sides: Sequence[Any]) -> list[Edge]:
     """The edges of a polygon. corners: mi.Vector3f, in order. sides: from each to the next."""
     following = [*corners[1:], corners[0]]
-    return [
-        Edge(*parts, mi.Bool(True)) for parts in zip(corners, following, sides, strict=True)
-    ]
+    return [Edge(*parts, mi.Bool(True)) for parts in zip(corners, following, sides, strict=True)]
 
 
 def above_horizon(edges: Sequence[Edge]) -> list[Edge]:

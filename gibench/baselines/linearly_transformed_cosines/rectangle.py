@@ -51,7 +51,9 @@ class Receiver:
         corner = light["centre"] - 0.5 * (across + up) - si.p
         sides = [across, up, -across, -up]
         corners = [corner, corner + across, corner + across + up, corner + up]
-        self.edges = outline(*([self.turned(mi.Vector3f(v)) for v in vectors] for vectors in (corners, sides)))
+        self.edges = outline(
+            *([self.turned(mi.Vector3f(v)) for v in vectors] for vectors in (corners, sides))
+        )
         self.lit = dr.dot(si.p - light["centre"], light["forward"]) > 0
 
     def turned(self, vector: Any) -> Any:
@@ -66,7 +68,7 @@ class Receiver:
         return mi.Vector3f(c * vector.x - s * vector.y, s * vector.x + c * vector.y, vector.z * self._side)
 
     def form_factor(self, above: list[Edge], transform: Transform | None = None) -> Any:
-        """Of the rectangle, for a cosine or for a transformed one, mi.Float in [0, 1]. above: edges over the surface."""
+        """For a cosine or a transformed one, mi.Float in [0, 1]. above: edges of the rectangle over the surface."""
         edges = above if transform is None else [edge.mapped(transform.inverse) for edge in above]
         return dr.select(self.lit, form_factor(edges), 0)
 

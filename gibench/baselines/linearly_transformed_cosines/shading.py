@@ -29,7 +29,10 @@ from gibench.rendering.lobes import diffuse_lobe, sample_specular, split
 from gibench.rendering.scene import Scene
 
 FOLLOWED = int(
-    mi.BSDFFlags.Delta | mi.BSDFFlags.Null | mi.BSDFFlags.GlossyTransmission | mi.BSDFFlags.DiffuseTransmission
+    mi.BSDFFlags.Delta
+    | mi.BSDFFlags.Null
+    | mi.BSDFFlags.GlossyTransmission
+    | mi.BSDFFlags.DiffuseTransmission
 )
 """Lobes for which a ray is followed."""
 
@@ -52,8 +55,10 @@ def luminance(color: Any) -> Any:
 
 @dataclass
 class Surfaces:
-    """First hits, ready to be lit. roughness: GGX alpha, mi.Float. f0: mi.Color3f at normal incidence. followed: whether
-    what is not diffuse is left to rays. plain: whether the material is a diffuse one.
+    """First hits, ready to be lit.
+
+    roughness: GGX alpha, mi.Float. f0: reflectance at normal incidence, mi.Color3f. followed: whether what is not
+    diffuse is left to rays. plain: whether the material is a diffuse one.
     """
 
     hits: FirstHits

@@ -52,9 +52,9 @@ def table() -> NDArray[np.float32]:
 class Transform:
     """Lobes that are transformed cosines, a lane each, mi.Float.
 
-    m11, m22, m13: of the matrix. sine, cosine: of the angle of Z with the normal, away from the viewer. share: reflected
-    of white light by a lobe that reflects all, grazing: the integral of lobe · (1 − wh·wi)⁵, both over the part of the
-    cosine that is above the surface.
+    m11, m22, m13: of the matrix. sine, cosine: of the angle of Z with the normal, away from the viewer. share: what a
+    lobe of the reflectance 1 reflects of white light, grazing: the integral of lobe · (1 − wh·wi)⁵, both over the part
+    of the cosine that is above the surface.
     """
 
     m11: Any
