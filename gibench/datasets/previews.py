@@ -39,11 +39,11 @@ def contact_sheet(root: Path, table: pd.DataFrame) -> Image.Image:
     chosen = table.sort_values(["view", "room"]).head(SHEET_FRAMES).sort_values(["room", "view"])
     tiles = []
     for row in chosen.to_dict("records"):
-        picture = _thumbnail(root / str(row["file"]))
+        picture = thumbnail(root / str(row["file"]))
         tiles.append((picture, f"room {row['room']}  view {row['view']}", str(row["kind"])))
     width, height = tiles[0][0].size
     # As near to a 3:2 sheet as whole columns allow.
-    return _grid(tiles, columns=max(1, round(math.sqrt(len(tiles) * 1.5 * height / width))))
+    return grid(tiles, columns=max(1, round(math.sqrt(len(tiles) * 1.5 * height / width))))
 
 
 def frame_panel(frame: Frame) -> Image.Image:
@@ -54,7 +54,7 @@ def frame_panel(frame: Frame) -> Image.Image:
     for name, values in arrays.items():
         picture, legend = picture_of(CHANNELS[name], values, exposure)
         tiles.append((_enlarged(picture), name, legend))
-    return _grid(tiles, columns=min(len(tiles), 6))
+    return grid(tiles, columns=min(len(tiles), 6))
 
 
 def write_picture(path: Path, picture: Image.Image) -> None:
@@ -64,31 +64,33 @@ def write_picture(path: Path, picture: Image.Image) -> None:
     write_whole(path, content.getvalue())
 
 
-def _thumbnail(path: Path) -> Image.Image:
+def thumbnail(path: Path, exposure: float | None = None) -> Image.Image:
+    """A frame at the width of a contact sheet, tone-mapped. exposure: its own unless given."""
     arrays = decode(path, widen=True)
     name = "color" if "color" in arrays else next(iter(arrays))
     values = arrays[name]
     if name == "color":
-        picture: Picture = tone_map(values, reference_exposure(values))
+        picture: Picture = tone_map(values, reference_exposure(values) if exposure is None else exposure)
     else:
         picture, _ = picture_of(CHANNELS[name], values, 1.0)
-    image = _image(picture)
+    image = image_of(picture)
     height = max(1, round(SHEET_WIDTH * image.height / image.width))
     sampling = Image.Resampling.LANCZOS if image.width > SHEET_WIDTH else Image.Resampling.NEAREST
     return image.resize((SHEET_WIDTH, height), sampling)
 
 
-def _image(picture: NDArray[Any]) -> Image.Image:
+def image_of(picture: NDArray[Any]) -> Image.Image:
+    """Of (H, W, 3) in [0, 1], display-encoded."""
     return Image.fromarray(np.rint(255 * np.clip(picture, 0, 1)).astype(np.uint8), "RGB")
 
 
 def _enlarged(picture: Picture) -> Image.Image:
-    image = _image(picture)
+    image = image_of(picture)
     factor = max(1, math.ceil(PANEL_WIDTH / image.width))
     return image.resize((image.width * factor, image.height * factor), Image.Resampling.NEAREST)
 
 
-def _grid(tiles: list[tuple[Image.Image, str, str]], columns: int) -> Image.Image:
+def grid(tiles: list[tuple[Image.Image, str, str]], columns: int) -> Image.Image:
     """Tiles in reading order, each under its title (left) and a remark (right); all tiles have one size."""
     width, height = tiles[0][0].size
     gap, size = 6, 13

@@ -62,7 +62,7 @@ class NoView(GibenchError):
         self.what, self.reasons = what, reasons
 
 
-class Stage:
+class ViewSpace:
     """The facts of a room that cameras are placed by.
 
     free: polygon of the ground where a camera may stand. things: (N, 3) middles of what is worth looking at.
@@ -98,7 +98,7 @@ class Stage:
 
 
 def sample_stills(
-    rng: np.random.Generator, stage: Stage, count: int
+    rng: np.random.Generator, stage: ViewSpace, count: int
 ) -> tuple[tuple[Camera, ...], Counter[str]]:
     """Draw `count` single views: few that differ from each other, or many as they come.
 
@@ -127,7 +127,7 @@ def sample_stills(
 
 
 def sample_spread(
-    rng: np.random.Generator, stage: Stage, count: int, spread: Spread, beside: Sequence[Camera] = ()
+    rng: np.random.Generator, stage: ViewSpace, count: int, spread: Spread, beside: Sequence[Camera] = ()
 ) -> tuple[tuple[Camera, ...], Counter[str]]:
     """Draw `count` stills along walks, and away from these and from the cameras `beside`.
 
@@ -148,13 +148,13 @@ def sample_spread(
         ) from None
 
 
-def _candidates(rng: np.random.Generator, stage: Stage) -> tuple[list[View], Counter[str]]:
+def _candidates(rng: np.random.Generator, stage: ViewSpace) -> tuple[list[View], Counter[str]]:
     """Views anywhere that pass, of a batch, and how many did not, by reason."""
     views = stage.check([_candidate(rng, stage, xy) for xy in stage.points(rng, BATCH)])
     return [v for v in views if not v.reason], Counter(v.reason for v in views if v.reason)
 
 
-def _candidate(rng: np.random.Generator, stage: Stage, xy: FloatArray) -> Camera:
+def _candidate(rng: np.random.Generator, stage: ViewSpace, xy: FloatArray) -> Camera:
     """A camera at a point, turned to something far enough to show its surroundings."""
     z = stage.floor + rng.uniform(HEIGHTS[0], min(HEIGHTS[1], stage.height - 0.4))
     away = np.hypot(*(stage.things[:, :2] - xy).T)
@@ -183,7 +183,7 @@ def _difference(camera: Camera, others: Sequence[Camera]) -> float:
 
 
 def sample_path(
-    rng: np.random.Generator, stage: Stage, kind: str, frames: int
+    rng: np.random.Generator, stage: ViewSpace, kind: str, frames: int
 ) -> tuple[tuple[Camera, ...], Counter[str]]:
     """Draw a smooth path of `frames` views, every one of which passes.
 
@@ -214,7 +214,7 @@ def sample_path(
 
 
 def sample_planned(
-    rng: np.random.Generator, stage: Stage, plan: PathPlan
+    rng: np.random.Generator, stage: ViewSpace, plan: PathPlan
 ) -> tuple[tuple[Camera, ...], Counter[str]]:
     """Draw the cameras of a sequence, which bear its name. Returns and raises what `sample_path` does."""
     if plan.moves == "light":
@@ -228,7 +228,7 @@ def sample_planned(
 Curve = tuple[FloatArray, FloatArray]  # (N, 2) places and (N,) yaws
 
 
-def _inside(stage: Stage, xy: FloatArray) -> bool:
+def _inside(stage: ViewSpace, xy: FloatArray) -> bool:
     return bool(stage.free.covers(shapely.LineString(xy)))
 
 
@@ -245,7 +245,7 @@ def _aimed(xy: FloatArray, aim: FloatArray) -> FloatArray:
     return np.arctan2(towards[:, 1], towards[:, 0])
 
 
-def _walk(rng: np.random.Generator, stage: Stage, frames: int) -> Curve | None:
+def _walk(rng: np.random.Generator, stage: ViewSpace, frames: int) -> Curve | None:
     best: FloatArray | None = None
     for _ in range(12):
         knots = stage.points(rng, 4)
@@ -278,7 +278,7 @@ def _sharpest_bend(xy: FloatArray) -> float:
     return float(np.abs(turns).max())
 
 
-def _orbit(rng: np.random.Generator, stage: Stage, frames: int) -> Curve | None:
+def _orbit(rng: np.random.Generator, stage: ViewSpace, frames: int) -> Curve | None:
     aim = stage.things[int(rng.integers(len(stage.things)))][:2] + rng.normal(0.0, 0.2, 2)
     angles = np.linspace(0.0, 2 * math.pi, 120, endpoint=False) + rng.uniform(0, 2 * math.pi)
     for radius in rng.uniform(1.2, 3.2, 6):
@@ -309,7 +309,7 @@ def _longest_run(flags: FloatArray) -> tuple[int, int]:
     return best
 
 
-def _eight(rng: np.random.Generator, stage: Stage, frames: int) -> Curve | None:
+def _eight(rng: np.random.Generator, stage: ViewSpace, frames: int) -> Curve | None:
     t = np.linspace(0.0, 2 * math.pi, 121)
     shape = np.column_stack([np.sin(t), np.sin(t) * np.cos(t)])
     for xy in stage.points(rng, 12):

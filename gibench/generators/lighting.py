@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from gibench.generators.fixtures import sample_ceiling_panel, sample_downlight
-from gibench.generators.layouts.placement import Placed, Plan, RejectedRoom
+from gibench.generators.layouts.placement import FloorPlan, Placed, RejectedRoom
 from gibench.generators.layouts.relations import from_ceiling
 from gibench.generators.light import BULB_LUMENS, ROOM_LUMENS, sample_bulb, sample_kelvin, sample_room_flux
 
@@ -18,7 +18,7 @@ DOWNLIGHT_SHARE = {"bathroom": 0.6, "dining-kitchen": 0.45, "office": 0.25}  # o
 ENOUGH_LAMPS = 3  # rooms with that many bulbs may do without ceiling lights
 
 
-def light_room(rng: np.random.Generator, plan: Plan) -> None:
+def light_room(rng: np.random.Generator, plan: FloorPlan) -> None:
     """Hang ceiling lights where the plan leaves room, and set the flux of every lamp in it.
 
     rng: the lane of lights. The lamps of the room add up to 1500 to 6000 lm, each bulb gives 450 to 1600 lm. Raises
@@ -69,13 +69,13 @@ def _fit(fluxes: np.ndarray, total: float) -> np.ndarray:
     return np.clip(lower * fluxes, low, high)
 
 
-def _set(plan: Plan, lamp: Placed, lumens: float, kelvin: float) -> None:
+def _set(plan: FloorPlan, lamp: Placed, lumens: float, kelvin: float) -> None:
     lights = tuple(replace(light, lumens=lumens, kelvin=kelvin) for light in lamp.furniture.lights)
     parameters = {**lamp.furniture.parameters, "lumens": lumens, "kelvin": kelvin}
     plan.replace_furniture(lamp, replace(lamp.furniture, lights=lights, parameters=parameters))
 
 
-def _fixtures(rng: np.random.Generator, plan: Plan) -> list[Placed]:
+def _fixtures(rng: np.random.Generator, plan: FloorPlan) -> list[Placed]:
     """Downlights in a grid, or panels along the longer side."""
     low, high = plan.shell.footprint.min(0), plan.shell.footprint.max(0)
     size = high - low

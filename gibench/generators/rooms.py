@@ -13,7 +13,7 @@ from gibench.generators.cameras import (
     PATHS,
     NoView,
     PathPlan,
-    Stage,
+    ViewSpace,
     sample_path,
     sample_planned,
     sample_spread,
@@ -22,7 +22,7 @@ from gibench.generators.cameras import (
 from gibench.generators.daylight import sample_daylight
 from gibench.generators.gloss import GLOSS, MUCH, visible_gloss
 from gibench.generators.layouts import FURNISH
-from gibench.generators.layouts.placement import Placed, Plan, RejectedRoom
+from gibench.generators.layouts.placement import FloorPlan, Placed, RejectedRoom
 from gibench.generators.layouts.solids import bounds_of, component_boxes, moved, triangles, whole_box
 from gibench.generators.light_shapes import placed_light
 from gibench.generators.lighting import light_room
@@ -177,7 +177,7 @@ def _try_room(
             environment=environment,
         )
     shell = sample_shell(lane("shell"), kind, **fixed)
-    plan = Plan(shell, kind, lane("layout"))
+    plan = FloorPlan(shell, kind, lane("layout"))
     FURNISH[kind](plan)
     light_room(lane("lights"), plan)
     if len(plan.placed) < LEAST_THINGS:
@@ -193,7 +193,7 @@ def _try_room(
         _polish_something(palette, plan)
     objects = _objects(plan, palette)
 
-    stage = Stage(free, shell.height, _middles(plan), _caster(plan), len(shell.pieces))
+    stage = ViewSpace(free, shell.height, _middles(plan), _caster(plan), len(shell.pieces))
     if spread is not None:
         cameras, refused = sample_spread(lane("cameras"), stage, views, spread)
     elif path is None:
@@ -244,7 +244,7 @@ def _try_room(
     )
 
 
-def _caster(plan: Plan) -> RayCaster:
+def _caster(plan: FloorPlan) -> RayCaster:
     """Rays against everything in the room; the owner of a hit is the number of the object.
 
     The shell is what it is, but furniture is made of boxes here: the grid of rays is coarser than its details, and
@@ -271,12 +271,12 @@ def _solid(thing: Placed) -> FloatArray:
     return moved(boxes[sizes >= min(DETAIL, sizes.max())], thing.position, thing.yaw)
 
 
-def _middles(plan: Plan) -> FloatArray:
+def _middles(plan: FloorPlan) -> FloatArray:
     """(N, 3) middles of the furniture, which is what cameras look at."""
     return np.array([[*p.position[:2], (p.boxes[:, 5].min() + p.boxes[:, 6].max()) / 2] for p in plan.placed])
 
 
-def _polish_something(palette: Palette, plan: Plan) -> None:
+def _polish_something(palette: Palette, plan: FloorPlan) -> None:
     """Half the rooms get one large surface that shows reflections."""
     rng = palette.rng("polish")
     wanted, favourite = rng.random() < GLOSSY_SHARE, rng.random()
@@ -288,13 +288,13 @@ def _polish_something(palette: Palette, plan: Plan) -> None:
     palette.polish(*choices[choice])
 
 
-def _polish_everything(palette: Palette, plan: Plan) -> None:
+def _polish_everything(palette: Palette, plan: FloorPlan) -> None:
     """The floor and all furniture with surfaces in one piece show reflections."""
     for family, slot in _polishable(plan):
         palette.polish(family, slot)
 
 
-def _polishable(plan: Plan) -> list[tuple[str, str]]:
+def _polishable(plan: FloorPlan) -> list[tuple[str, str]]:
     """Families and slots with large surfaces that take a polish, the floor first."""
     choices = [("floor", "floor")]
     for thing in plan.placed:
@@ -306,7 +306,7 @@ def _polishable(plan: Plan) -> list[tuple[str, str]]:
     return choices
 
 
-def _objects(plan: Plan, palette: Palette) -> tuple[RoomObject, ...]:
+def _objects(plan: FloorPlan, palette: Palette) -> tuple[RoomObject, ...]:
     objects = []
     for piece in plan.shell.pieces:
         shapes = _shapes(piece.name, piece.family, piece.parts, palette, (0.0, 0.0, 0.0), 0.0)

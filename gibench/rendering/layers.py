@@ -29,7 +29,7 @@ PLAIN_ETA = ("SmoothPlastic", "SmoothDielectric")
 
 
 @dataclass
-class Part:
+class Leaf:
     """A leaf and its share of the surface. bsdf: pointers; weight: mi.Float in [0, 1]."""
 
     bsdf: Any
@@ -99,13 +99,13 @@ class Layers:
         self._nodes[registry_key("BSDFPtr", bsdf)] = (kind, first, second)
         return depth + 1
 
-    def parts(self, bsdf: Any, si: Any, active: Any) -> tuple[list[Part], Any]:
+    def parts(self, bsdf: Any, si: Any, active: Any) -> tuple[list[Leaf], Any]:
         """The leaves of a material, and how much of the surface is not there (a mask's holes), mi.Float in [0, 1].
 
         bsdf: pointers (or in scalar mode an object). The shares of the leaves and the holes sum to 1.
         """
         if self.depth == 0:
-            return [Part(bsdf, mi.Float(1))], mi.Float(0)
+            return [Leaf(bsdf, mi.Float(1))], mi.Float(0)
         if is_scalar():
             return self._scalar_parts(bsdf, si, active, 1.0)
         return self._walk(bsdf, si, active, mi.Float(1), self.depth)
@@ -125,7 +125,7 @@ class Layers:
 
     def _walk(self, bsdf, si, active, weight, depth):
         if depth == 0:
-            return [Part(bsdf, weight)], mi.Float(0)
+            return [Leaf(bsdf, weight)], mi.Float(0)
         index = dr.reinterpret_array(mi.UInt32, bsdf)
         # Plugins of other scenes may have larger indices; none of them is met here.
         known = active & (index < dr.width(self.arrays[0]))
@@ -153,10 +153,10 @@ class Layers:
 
     def _scalar_parts(self, bsdf, si, active, weight):
         if not active:
-            return [Part(bsdf, weight)], 0.0
+            return [Leaf(bsdf, weight)], 0.0
         kind, first, second = self._nodes.get(id(bsdf), (LEAF, bsdf, bsdf))
         if kind == LEAF:
-            return [Part(bsdf, weight)], 0.0
+            return [Leaf(bsdf, weight)], 0.0
         if kind == MASK:
             opacity = min(max(bsdf.eval_attribute_1("opacity", si, True), 0.0), 1.0)
             parts, holes = self._scalar_parts(first, si, active, weight * opacity)

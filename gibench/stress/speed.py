@@ -33,7 +33,7 @@ FIRST_TIMED = 64
 
 
 @dataclass(frozen=True)
-class Setting:
+class SamplingCase:
     """A way of sampling frames. odd: with one sample less than a multiple of 4, so that none are stratified."""
 
     name: str
@@ -41,9 +41,9 @@ class Setting:
     denoise: bool
 
 
-RAW = Setting("independent", odd=True, denoise=False)
-STRATIFIED = Setting("stratified", odd=False, denoise=False)
-DENOISED = Setting("stratified, denoised", odd=False, denoise=True)
+RAW = SamplingCase("independent", odd=True, denoise=False)
+STRATIFIED = SamplingCase("stratified", odd=False, denoise=False)
+DENOISED = SamplingCase("stratified, denoised", odd=False, denoise=True)
 
 
 def furnished_room() -> tuple[Scene, PinholeCamera]:

@@ -377,7 +377,10 @@ def test_a_process_that_was_stopped_itself_gives_nobody_up(monkeypatch):
     monkeypatch.setattr(pool, "_processor_seconds", lambda process: 1.0)
     now = [0.0]
     monkeypatch.setattr(pool.time, "monotonic", lambda: now[0])
-    watch, worker = pool._Watch(), pool._Worker(None, SimpleNamespace(poll=lambda: False), room=3, ready=True)
+    watch, worker = (
+        pool._Watch(),
+        pool._Worker(None, SimpleNamespace(poll=lambda: False), 25, room=3, ready=True),
+    )
     for now[0] in (3.0, 3600.0, 3603.0):
         watch.look([worker])
     assert worker.hung == ""

@@ -10,7 +10,7 @@ from gibench.generators.cameras import (
     HEIGHTS,
     PATHS,
     NoView,
-    Stage,
+    ViewSpace,
     camera_at,
     sample_path,
     sample_stills,
@@ -40,7 +40,7 @@ def stage():
         things.append((x, y, 0.7))
         meshes.append(box((x - 0.15, y - 0.15, 0), (x + 0.15, y + 0.15, 1.4)))
     caster = RayCaster(meshes, list(range(len(meshes))))
-    return Stage(FREE, 3.0, np.array(things), caster, 6)
+    return ViewSpace(FREE, 3.0, np.array(things), caster, 6)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -100,7 +100,7 @@ def test_a_figure_eight_crosses_itself_and_an_orbit_keeps_its_distance(stage):
 
 def test_an_empty_hall_has_no_view():
     meshes = [box((-4, -4, -0.2), (4, 4, 0)), box((-4, -4, 3), (4, 4, 3.2))]
-    stage = Stage(FREE, 3.0, np.array([[0.0, 0, 1], [1, 1, 1]]), RayCaster(meshes, [0, 1]), 2)
+    stage = ViewSpace(FREE, 3.0, np.array([[0.0, 0, 1], [1, 1, 1]]), RayCaster(meshes, [0, 1]), 2)
     with pytest.raises(NoView, match="no stills passed") as caught:
         sample_stills(np.random.default_rng(0), stage, 2)
     assert sum(caught.value.reasons.values()) > 100

@@ -15,7 +15,7 @@ from gibench.baselines.efficient_light_probes import METHOD
 from gibench.baselines.efficient_light_probes.examples import Example, examples
 from gibench.baselines.efficient_light_probes.implementation import ReflectionSearch
 from gibench.baselines.efficient_light_probes.temporal import DECAY, accumulated, reprojected
-from gibench.baselines.efficient_light_probes.training import Plan, trained_network
+from gibench.baselines.efficient_light_probes.training import TrainingPlan, trained_network
 from gibench.baselines.first_hits import hits_of_rays
 from gibench.baselines.image_to_image.device_frames import as_image
 from gibench.baselines.method import Prediction, Setting, Site, View
@@ -54,7 +54,7 @@ class Reconstruction(ReflectionSearch):
         """Bake the lightmap and the probes, train the network, or find them."""
         super().prepare(site)
         self.kernels["temporal"] = Replay(site.scene, reprojected)
-        plan = Plan.of(self.settings, site.seed)
+        plan = TrainingPlan.of(self.settings, site.seed)
 
         def made() -> list[Example]:
             # One training serves all settings that do not bake, whichever of them is rendered first.

@@ -55,7 +55,7 @@ PATIENCE = 0.5
 
 
 @dataclass(frozen=True)
-class Plan:
+class TrainingPlan:
     """Settings of a training, beside its examples.
 
     epochs: passes over the views. crop: pixels along a side. fusion: of the network. lpips: whether there is the
@@ -70,9 +70,9 @@ class Plan:
     seed: int
 
     @staticmethod
-    def of(settings: Mapping[str, Setting], seed: int) -> Plan:
+    def of(settings: Mapping[str, Setting], seed: int) -> TrainingPlan:
         """From the settings of the method."""
-        return Plan(
+        return TrainingPlan(
             int(settings["epochs"]),
             int(settings["crop"]),
             str(settings["fusion"]),
@@ -92,7 +92,7 @@ class Network:
 
 
 def trained_network(
-    site: Site, plan: Plan, settings: Mapping[str, Setting], examples: Callable[[], Sequence[Example]]
+    site: Site, plan: TrainingPlan, settings: Mapping[str, Setting], examples: Callable[[], Sequence[Example]]
 ) -> Network:
     """The network of a site, trained where it is not there yet.
 
@@ -156,7 +156,7 @@ class Crops(NamedTuple):
 class Reconstructing(Learner):
     """The reconstruction network of a scene, which learns from all of its views but the last."""
 
-    def __init__(self, examples: Sequence[Example], plan: Plan, device: str | None = None) -> None:
+    def __init__(self, examples: Sequence[Example], plan: TrainingPlan, device: str | None = None) -> None:
         """examples: two at least. device: of torch; where none is given that of the variant."""
         self.plan = plan
         device = device or torch_device()

@@ -90,7 +90,7 @@ def _unpacked(bits: Any) -> Any:
     return OCTAHEDRON.direction(mi.Point2f(mi.Float(bits & 0xFFFF), mi.Float(bits >> 16)))
 
 
-class Table:
+class TexelTable:
     """All that the search reads of a texel, side by side: one place of the memory a sample rather than nine.
 
     probes: with MAPS. arrays: what a `Replay` must hold, those of the probes included.
@@ -216,7 +216,7 @@ class Search:
     unit: Any
 
 
-def best_sample(table: Table, probe: Any, wanted: Wanted, eye: Any, search: Search, active: Any):
+def best_sample(table: TexelTable, probe: Any, wanted: Wanted, eye: Any, search: Search, active: Any):
     """The sample of probes (mi.UInt32) that fits best: its energy, mi.Float, and its place on the map, mi.Point2f.
 
     eye: mi.Point3f. The energy is NOTHING where the probe does not show the surface near to where it should.
@@ -239,7 +239,14 @@ def best_sample(table: Table, probe: Any, wanted: Wanted, eye: Any, search: Sear
 
 @dr.syntax
 def gathered(
-    table: Table, chosen: Any, shares: Any, number: Any, wanted: Wanted, eye: Any, search: Search, active: Any
+    table: TexelTable,
+    chosen: Any,
+    shares: Any,
+    number: Any,
+    wanted: Wanted,
+    eye: Any,
+    search: Search,
+    active: Any,
 ):
     """Glossy radiance from several probes (equation 2), mi.Color3f, and the least energy among them, mi.Float.
 

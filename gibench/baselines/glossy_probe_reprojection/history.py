@@ -20,7 +20,7 @@ APART = 4.0
 
 
 @dataclass
-class Frame:
+class PastFrame:
     """A frame that was rendered, a lane a pixel in row order.
 
     camera: from `replay.camera_arrays`. width, height: mi.Int32 of one lane. color: its glossy light, mi.Color3f.
@@ -36,7 +36,7 @@ class Frame:
     known: Any
 
 
-def recalled(frame: Frame, point: Any, material: Any, active: Any) -> tuple[Any, Any]:
+def recalled(frame: PastFrame, point: Any, material: Any, active: Any) -> tuple[Any, Any]:
     """Glossy light of points in an earlier frame, mi.Color3f, and whether that frame saw them, mi.Bool.
 
     point: mi.Point3f, m. material: mi.UInt32, of their surfaces.

@@ -19,12 +19,12 @@ from gibench.baselines.glossy_probe_reprojection.gather import (
     MAPS,
     NOTHING,
     Search,
-    Table,
+    TexelTable,
     Wanted,
     gathered,
     trilinear,
 )
-from gibench.baselines.glossy_probe_reprojection.history import Frame, recalled
+from gibench.baselines.glossy_probe_reprojection.history import PastFrame, recalled
 from gibench.baselines.glossy_probe_reprojection.perturbation import Mirror
 from gibench.baselines.lightmap.deferred import OnLightmap
 from gibench.baselines.method import Prediction, Setting, Site, View
@@ -104,7 +104,7 @@ def _gathered(table, chosen, shares, number, eye, surfaces, mirrored, search, pa
 def _recalled(frame, surfaces, color, energy):
     """The same, with the frame before where no probe has anything."""
     missing = surfaces["glossy"] & (energy >= NOTHING)
-    old, found = recalled(Frame(**frame), surfaces["position"], surfaces["material"], missing)
+    old, found = recalled(PastFrame(**frame), surfaces["position"], surfaces["material"], missing)
     result = dr.select(found, old, color), dr.select(found, RECALLED, energy)
     dr.eval(result)
     return result
@@ -158,7 +158,7 @@ class GlossyProbeReprojection(OnLightmap):
         self._positions = np.array(probes.arrays[POSITIONS]).reshape(-1, 3)
         curvature = site.scene.curvature.arrays
         self.kernels["curvature"] = Replay(site.scene, partial(_bent, site.scene), curvature)
-        table, footprint = Table(probes), Footprint()
+        table, footprint = TexelTable(probes), Footprint()
         self.kernels["gather"] = Replay(site.scene, partial(_gathered, table), table.arrays)
         self.kernels["history"] = Replay(site.scene, _recalled)
         self.kernels["filter"] = Replay(site.scene, partial(_filtered, footprint), footprint.arrays)

@@ -11,7 +11,7 @@ import shapely
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from gibench.generators.cameras import HEIGHTS, Stage
+from gibench.generators.cameras import HEIGHTS, ViewSpace
 from gibench.generators.imported.errors import NoPlaceForCamera
 from gibench.generators.parts import FloatArray
 from gibench.rendering.free_space import enclosed, fan, seen_from, surroundings
@@ -78,7 +78,7 @@ def hits(scene: Scene, origins: FloatArray, directions: FloatArray) -> tuple[Any
     return np.array(si.t), np.array(shape).astype(np.int64), face, np.array(si.n).T
 
 
-def survey(scene: Scene, found: FloatArray) -> Stage:
+def survey(scene: Scene, found: FloatArray) -> ViewSpace:
     """Find the floor, where on it a camera may stand, and what to look at. Needs a vectorised variant.
 
     found: (N, 3) points of the free space. Raises NoPlaceForCamera where there is no room to stand in.
@@ -95,7 +95,7 @@ def survey(scene: Scene, found: FloatArray) -> Stage:
     things = _thinned(middles[inside])
     if not len(things):
         things = np.array([(low + high) / 2])
-    return Stage(free, height, things, caster, caster.shell_owners, floor)
+    return ViewSpace(free, height, things, caster, caster.shell_owners, floor)
 
 
 def _floor(scene: Scene, found: FloatArray) -> float:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from gibench.generators.layouts import dressing
-from gibench.generators.layouts.placement import Plan, required
+from gibench.generators.layouts.placement import FloorPlan, required
 from gibench.generators.layouts.relations import above, against_wall
 
 
-def furnish(plan: Plan) -> None:
+def furnish(plan: FloorPlan) -> None:
     """Furnish an empty plan. Raises RejectedRoom where no tub or basin fits."""
     dressing.hang_curtains(plan, 0.2)
     piece = plan.sample("bathtub")

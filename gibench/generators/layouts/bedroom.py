@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from gibench.generators.layouts import dressing
 from gibench.generators.layouts.office import equip_desk
-from gibench.generators.layouts.placement import Placed, Plan, required
+from gibench.generators.layouts.placement import FloorPlan, Placed, required
 from gibench.generators.layouts.relations import against_wall, beside, in_front
 from gibench.generators.layouts.solids import bounds_of, rectangle
 
 BED_SIDE = 0.55  # floor that stays free along one side of a bed, m
 
 
-def furnish(plan: Plan) -> None:
+def furnish(plan: FloorPlan) -> None:
     """Furnish an empty plan. Raises RejectedRoom where no bed fits."""
     dressing.hang_curtains(plan, 0.85)
     bed = required(_bed(plan), "a bed")
@@ -61,7 +61,7 @@ def furnish(plan: Plan) -> None:
     dressing.dress_surfaces(plan)
 
 
-def _bed(plan: Plan) -> Placed | None:
+def _bed(plan: FloorPlan) -> Placed | None:
     for width in (2.0, 1.4, 0.95):
         piece = plan.sample("bed")
         if bounds_of(piece)[1, 0] * 2 > width:
@@ -79,7 +79,7 @@ def _bed(plan: Plan) -> Placed | None:
     return None
 
 
-def _rug(plan: Plan, bed: Placed) -> None:
+def _rug(plan: FloorPlan, bed: Placed) -> None:
     """A rug at the foot or at a side of the bed."""
     draw = plan.rng.random()
     half_x, half_y = bed.half

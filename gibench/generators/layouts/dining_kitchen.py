@@ -6,7 +6,7 @@ import numpy as np
 
 from gibench.generators.fixtures import splashback
 from gibench.generators.layouts import dressing
-from gibench.generators.layouts.placement import Placed, Plan, required
+from gibench.generators.layouts.placement import FloorPlan, Placed, required
 from gibench.generators.layouts.relations import above, against_wall, around, beside, free_spot, on_top
 from gibench.generators.layouts.solids import bounds_of
 
@@ -15,7 +15,7 @@ TUCK = 0.22  # how far chairs are pushed under a table, m
 CUPBOARD = 0.55  # between a worktop and the cupboards above it, m
 
 
-def furnish(plan: Plan) -> None:
+def furnish(plan: FloorPlan) -> None:
     """Furnish an empty plan. Raises RejectedRoom where neither counter nor table fits."""
     dressing.hang_curtains(plan, 0.5)
     counter = required(_counter(plan, "sink_hob"), "a kitchen counter")
@@ -49,7 +49,7 @@ def furnish(plan: Plan) -> None:
     dressing.dress_surfaces(plan, density=4.0)
 
 
-def _counter(plan: Plan, style: str) -> Placed | None:
+def _counter(plan: FloorPlan, style: str) -> Placed | None:
     for width in (float(plan.rng.uniform(2.4, 3.6)), 2.4, 1.8):
         piece = plan.sample("kitchen_counter", width=round(width, 4), style=style)
         counter = against_wall(plan, piece, corner=plan.chance(0.6), use=0.8, use_but=("chair",))
@@ -58,7 +58,7 @@ def _counter(plan: Plan, style: str) -> Placed | None:
     return None
 
 
-def _above_worktop(plan: Plan, counter: Placed) -> None:
+def _above_worktop(plan: FloorPlan, counter: Placed) -> None:
     """Tiles on the wall and cupboards, as wide as the counter where no window is in the way."""
     worktop = float(counter.furniture.parameters["worktop"])
     width = round(2 * counter.half[0], 4)
@@ -74,7 +74,7 @@ def _above_worktop(plan: Plan, counter: Placed) -> None:
             break
 
 
-def _island(plan: Plan) -> None:
+def _island(plan: FloorPlan) -> None:
     """A counter in open floor with stools along its back."""
     width = round(float(plan.rng.uniform(1.2, 1.9)), 4)
     style = "sink" if plan.chance(0.4) else "plain"
@@ -90,7 +90,7 @@ def _island(plan: Plan) -> None:
         plan.put(stool, at, island.yaw)
 
 
-def dining_group(plan: Plan) -> Placed | None:
+def dining_group(plan: FloorPlan) -> Placed | None:
     """A table in free space with chairs around it, perhaps on a rug."""
     for width in (2.2, 1.5, 1.2, 1.0):
         piece = plan.sample("dining_table")

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from gibench.generators.layouts.placement import Placed, Plan, support_area
+from gibench.generators.layouts.placement import FloorPlan, Placed, support_area
 from gibench.generators.layouts.relations import (
     above,
     against_wall,
@@ -47,7 +47,7 @@ SMALL_THINGS: dict[str, dict[str, float]] = {
 }
 
 
-def hang_curtains(plan: Plan, share: float) -> None:
+def hang_curtains(plan: FloorPlan, share: float) -> None:
     """Hang curtains at that share of the windows, down to the floor or to the sill."""
     for window in plan.shell.windows:
         if not plan.chance(share):
@@ -67,7 +67,7 @@ def hang_curtains(plan: Plan, share: float) -> None:
 
 
 def rug_under(
-    plan: Plan, x: float, y: float, yaw: float, *, width: float, depth: float, bare: bool = False
+    plan: FloorPlan, x: float, y: float, yaw: float, *, width: float, depth: float, bare: bool = False
 ) -> Placed | None:
     """Lay a rug at a place, smaller and smaller until it fits. bare: nothing is to stand on it."""
     style = str(plan.rng.choice(["bordered", "plain", "oval"])) if bare else "plain"
@@ -82,7 +82,7 @@ def rug_under(
     return None
 
 
-def picture_above(plan: Plan, anchor: Placed) -> Placed | None:
+def picture_above(plan: FloorPlan, anchor: Placed) -> Placed | None:
     """A picture, or a mirror now and then, over a piece that stands at a wall."""
     clear = float(plan.rng.uniform(0.15, 0.35))
     widest = 2 * anchor.half[0]
@@ -96,7 +96,9 @@ def picture_above(plan: Plan, anchor: Placed) -> Placed | None:
     return None
 
 
-def fill_walls(plan: Plan, weights: Mapping[str, float], *, share: tuple[float, float] = (0.2, 0.3)) -> None:
+def fill_walls(
+    plan: FloorPlan, weights: Mapping[str, float], *, share: tuple[float, float] = (0.2, 0.3)
+) -> None:
     """Stand more furniture at the walls until it covers enough of the floor, or nothing fits any more.
 
     weights: family → how often. share: bounds of the part of the floor that all furniture is to cover.
@@ -113,7 +115,7 @@ def fill_walls(plan: Plan, weights: Mapping[str, float], *, share: tuple[float, 
             picture_above(plan, piece)
 
 
-def _covered(plan: Plan) -> float:
+def _covered(plan: FloorPlan) -> float:
     """Floor under furniture, m²."""
     return sum(
         4 * p.half[0] * p.half[1]
@@ -122,7 +124,7 @@ def _covered(plan: Plan) -> float:
     )
 
 
-def reading_corner(plan: Plan) -> None:
+def reading_corner(plan: FloorPlan) -> None:
     """An armchair across a corner, with a small table and a lamp."""
     seat = in_corner(plan, plan.sample("armchair"), room=0.25)
     if seat is None:
@@ -132,7 +134,7 @@ def reading_corner(plan: Plan) -> None:
     beside(plan, plan.sample("floor_lamp"), seat, -side, 0.02)
 
 
-def in_the_middle(plan: Plan, furniture: Furniture, *, around: float, rug: float = 0.0) -> Placed | None:
+def in_the_middle(plan: FloorPlan, furniture: Furniture, *, around: float, rug: float = 0.0) -> Placed | None:
     """Stand a piece in open floor, `around` m free about it, on a rug that reaches `rug` m beyond it if > 0."""
     spot = free_spot(plan, furniture, around=around)
     if spot is None:
@@ -144,7 +146,7 @@ def in_the_middle(plan: Plan, furniture: Furniture, *, around: float, rug: float
     return plan.put(furniture, (x, y), yaw)
 
 
-def seating_group(plan: Plan) -> None:
+def seating_group(plan: FloorPlan) -> None:
     """Two to four seats around a low table in open floor."""
     table = in_the_middle(plan, plan.sample("coffee_table", width=0.8), around=1.15, rug=0.9)
     if table is None:
@@ -154,13 +156,13 @@ def seating_group(plan: Plan) -> None:
         facing(plan, seat, table, float(angle), 0.25, tilt=float(plan.rng.normal(0.0, 0.1)))
 
 
-def pictures(plan: Plan, count: int) -> None:
+def pictures(plan: FloorPlan, count: int) -> None:
     """Pictures on free stretches of wall."""
     for _ in range(count):
         hang_free(plan, plan.sample("picture"), middle=EYE_LEVEL + float(plan.rng.normal(0.0, 0.06)))
 
 
-def plants(plan: Plan, count: int) -> None:
+def plants(plan: FloorPlan, count: int) -> None:
     """Plants on the floor, in corners or at walls."""
     for _ in range(count):
         plant = plan.sample("plant")
@@ -168,20 +170,20 @@ def plants(plan: Plan, count: int) -> None:
             against_wall(plan, plant, tries=6)
 
 
-def floor_lamps(plan: Plan, count: int) -> None:
+def floor_lamps(plan: FloorPlan, count: int) -> None:
     """Lamps in corners that nothing else has taken."""
     for _ in range(count):
         in_corner(plan, plan.sample("floor_lamp"))
 
 
-def pendant_over(plan: Plan, thing: Placed, lowest: float) -> Placed | None:
+def pendant_over(plan: FloorPlan, thing: Placed, lowest: float) -> Placed | None:
     """A pendant over the middle of a piece, its lower end at about that height (m)."""
     drop = plan.shell.height - lowest - float(plan.rng.uniform(0.0, 0.15))
     lamp = plan.sample("pendant", height=round(float(np.clip(drop, 0.45, 1.4)), 4))
     return from_ceiling(plan, lamp, thing.position[:2], thing.yaw)
 
 
-def pendant_in_middle(plan: Plan) -> Placed | None:
+def pendant_in_middle(plan: FloorPlan) -> Placed | None:
     """A short pendant near the middle of the free floor, high enough to walk under."""
     free = plan.free_floor()
     if free.is_empty:
@@ -194,12 +196,12 @@ def pendant_in_middle(plan: Plan) -> Placed | None:
     return from_ceiling(plan, lamp, (float(x), float(y)))
 
 
-def table_lamp_on(plan: Plan, carrier: Placed, at: tuple[float, float] | None = None) -> Placed | None:
+def table_lamp_on(plan: FloorPlan, carrier: Placed, at: tuple[float, float] | None = None) -> Placed | None:
     """A table lamp on a piece of furniture."""
     return on_top(plan, plan.sample("table_lamp"), carrier, at=at, yaw=0.0)
 
 
-def dress_surfaces(plan: Plan, *, density: float = 5.0, most: int = 22) -> None:
+def dress_surfaces(plan: FloorPlan, *, density: float = 5.0, most: int = 22) -> None:
     """Put small things on whatever has room for them.
 
     density: things per square metre of support on average. most: of them in the room.
@@ -219,18 +221,18 @@ def dress_surfaces(plan: Plan, *, density: float = 5.0, most: int = 22) -> None:
                     count += 1
 
 
-def _pick(plan: Plan, weights: Mapping[str, float]) -> str:
+def _pick(plan: FloorPlan, weights: Mapping[str, float]) -> str:
     share = np.array(list(weights.values()))
     return str(plan.rng.choice(list(weights), p=share / share.sum()))
 
 
-def mirrors(plan: Plan, count: int) -> None:
+def mirrors(plan: FloorPlan, count: int) -> None:
     """Mirrors on free stretches of wall."""
     for _ in range(count):
         hang_free(plan, plan.sample("mirror"), middle=EYE_LEVEL)
 
 
-def wall_lamps_beside(plan: Plan, anchor: Placed, height: float) -> None:
+def wall_lamps_beside(plan: FloorPlan, anchor: Placed, height: float) -> None:
     """A pair of wall lamps, or one, at the sides of something that stands or hangs at a wall."""
     lamp = plan.sample("wall_lamp")
     reach = anchor.half[0] + float(bounds_of(lamp)[1, 0]) + 0.08

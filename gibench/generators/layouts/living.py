@@ -6,7 +6,7 @@ import math
 
 from gibench.generators.layouts import dressing
 from gibench.generators.layouts.dining_kitchen import dining_group
-from gibench.generators.layouts.placement import Placed, Plan, required
+from gibench.generators.layouts.placement import FloorPlan, Placed, required
 from gibench.generators.layouts.relations import (
     across_from,
     against_wall,
@@ -20,7 +20,7 @@ from gibench.generators.layouts.solids import bounds_of
 SEATED = ("coffee_table", "armchair", "ottoman", "floor_lamp")  # what may stand in the space before a sofa
 
 
-def furnish(plan: Plan) -> None:
+def furnish(plan: FloorPlan) -> None:
     """Furnish an empty plan. Raises RejectedRoom where no sofa fits."""
     dressing.hang_curtains(plan, 0.75)
     sofa = required(_sofa(plan), "a sofa")
@@ -65,7 +65,7 @@ def furnish(plan: Plan) -> None:
     dressing.dress_surfaces(plan)
 
 
-def _sofa(plan: Plan) -> Placed | None:
+def _sofa(plan: FloorPlan) -> Placed | None:
     for widest in (3.2, 2.3, 1.8):
         piece = plan.sample("sofa")
         if bounds_of(piece)[1, 0] * 2 > widest:
@@ -77,7 +77,7 @@ def _sofa(plan: Plan) -> Placed | None:
     return None
 
 
-def _coffee_table(plan: Plan, sofa: Placed) -> Placed | None:
+def _coffee_table(plan: FloorPlan, sofa: Placed) -> Placed | None:
     distance = float(plan.rng.uniform(0.35, 0.5))
     if plan.chance(0.7):
         x, y = sofa.point(0.0, sofa.half[1] + 0.95)
@@ -85,7 +85,7 @@ def _coffee_table(plan: Plan, sofa: Placed) -> Placed | None:
     return in_front(plan, plan.sample("coffee_table"), sofa, distance)
 
 
-def _television(plan: Plan, sofa: Placed) -> None:
+def _television(plan: FloorPlan, sofa: Placed) -> None:
     stand = across_from(plan, plan.sample("tv_stand"), sofa, use=0.4, use_but=SEATED)
     if stand is None:
         return

@@ -6,11 +6,11 @@ import math
 
 from gibench.generators.layouts import dressing
 from gibench.generators.layouts.dining_kitchen import dining_group
-from gibench.generators.layouts.placement import Placed, Plan, required
+from gibench.generators.layouts.placement import FloorPlan, Placed, required
 from gibench.generators.layouts.relations import against_wall, facing, free_spot, in_corner, in_front, on_top
 
 
-def furnish(plan: Plan) -> None:
+def furnish(plan: FloorPlan) -> None:
     """Furnish an empty plan. Raises RejectedRoom where no desk fits."""
     dressing.hang_curtains(plan, 0.4)
     required(_work_place(plan, free_standing=plan.chance(0.35)), "a desk")
@@ -38,7 +38,7 @@ def furnish(plan: Plan) -> None:
     dressing.dress_surfaces(plan)
 
 
-def _work_place(plan: Plan, *, free_standing: bool) -> Placed | None:
+def _work_place(plan: FloorPlan, *, free_standing: bool) -> Placed | None:
     piece = plan.sample("desk")
     desk = None
     if free_standing and (spot := free_spot(plan, piece, around=0.7)) is not None:
@@ -52,7 +52,7 @@ def _work_place(plan: Plan, *, free_standing: bool) -> Placed | None:
     return desk
 
 
-def equip_desk(plan: Plan, desk: Placed) -> None:
+def equip_desk(plan: FloorPlan, desk: Placed) -> None:
     """A laptop, or one or two monitors with a keyboard, and a lamp."""
     if plan.chance(0.25):
         on_top(plan, plan.sample("laptop"), desk, at=(0.0, 0.2), yaw=0.0)

@@ -1,6 +1,6 @@
 """Putting furniture into a shell: what stands where, and what still fits.
 
-`Plan` keeps the books: solid boxes, zones that must stay free, rugs that lift what stands on them. The relations
+`FloorPlan` keeps the books: solid boxes, zones that must stay free, rugs that lift what stands on them. The relations
 ("against a wall", "around a table") are in `relations`; they propose poses and ask the plan.
 """
 
@@ -93,7 +93,7 @@ class Placed:
         return self.position[0] + float(offset[0]), self.position[1] + float(offset[1])
 
 
-class Plan:
+class FloorPlan:
     """A room that is being furnished. rng: the random lane of the layout."""
 
     def __init__(self, shell: Shell, kind: str, rng: np.random.Generator) -> None:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gibench.generators.layouts.placement import CLOSE, LIFT, Placed, Plan, first, support_area, turned
+from gibench.generators.layouts.placement import CLOSE, LIFT, FloorPlan, Placed, first, support_area, turned
 from gibench.generators.layouts.solids import bounds_of, rectangle
 from gibench.generators.parts import FloatArray, Furniture
 from gibench.generators.poses import facing_yaw, turn
@@ -22,7 +22,7 @@ WALL_GAP = 0.001  # between a wall and what hangs on it, m
 
 
 def against_wall(
-    plan: Plan,
+    plan: FloorPlan,
     furniture: Furniture,
     *,
     walls: Sequence[int] | None = None,
@@ -70,7 +70,7 @@ def front_zone(edge: Sequence[float], yaw: float, half_x: float, depth: float) -
 
 
 def in_front(
-    plan: Plan,
+    plan: FloorPlan,
     furniture: Furniture,
     anchor: Placed,
     distance: float,
@@ -86,7 +86,7 @@ def in_front(
     return plan.put(furniture, xy, yaw)
 
 
-def beside(plan: Plan, furniture: Furniture, anchor: Placed, side: int, gap: float) -> Placed | None:
+def beside(plan: FloorPlan, furniture: Furniture, anchor: Placed, side: int, gap: float) -> Placed | None:
     """Stand a piece at the left (−1) or right (1) of another, backs in line, `gap` m between them."""
     half_x, half_y = bounds_of(furniture)[1, :2]
     x = side * (anchor.half[0] + gap + float(half_x))
@@ -94,7 +94,7 @@ def beside(plan: Plan, furniture: Furniture, anchor: Placed, side: int, gap: flo
 
 
 def around(
-    plan: Plan, chairs: Sequence[Furniture], table: Placed, *, tuck: float, ends: bool = True
+    plan: FloorPlan, chairs: Sequence[Furniture], table: Placed, *, tuck: float, ends: bool = True
 ) -> list[Placed]:
     """Stand chairs around a table, facing it, their fronts `tuck` m under its edge. Returns those that fitted.
 
@@ -126,7 +126,9 @@ def around(
     return placed
 
 
-def in_corner(plan: Plan, furniture: Furniture, *, tries: int = TRIES, room: float = 0.12) -> Placed | None:
+def in_corner(
+    plan: FloorPlan, furniture: Furniture, *, tries: int = TRIES, room: float = 0.12
+) -> Placed | None:
     """Stand a piece in a corner of the room, `room` m or so away from both walls, its front to the middle."""
     half = float(np.abs(bounds_of(furniture)[:, :2]).max())
     walls = plan.shell.walls
@@ -144,7 +146,7 @@ def in_corner(plan: Plan, furniture: Furniture, *, tries: int = TRIES, room: flo
 
 
 def free_spot(
-    plan: Plan, furniture: Furniture, *, around: float, tries: int = TRIES
+    plan: FloorPlan, furniture: Furniture, *, around: float, tries: int = TRIES
 ) -> tuple[tuple[float, float], float] | None:
     """A place (x, y) and yaw for a piece that stands freely, parallel to the walls, `around` m free about it."""
     half_x, half_y = (float(v) for v in bounds_of(furniture)[1, :2])
@@ -158,7 +160,7 @@ def free_spot(
 
 
 def on_top(
-    plan: Plan,
+    plan: FloorPlan,
     furniture: Furniture,
     carrier: Placed,
     *,
@@ -203,7 +205,7 @@ def on_top(
 
 
 def hang(
-    plan: Plan, furniture: Furniture, wall: Wall, s: float, z: float, *, away: float = WALL_GAP
+    plan: FloorPlan, furniture: Furniture, wall: Wall, s: float, z: float, *, away: float = WALL_GAP
 ) -> Placed | None:
     """Fix a piece to a wall, its middle at s along it and its lowest point at z; refused across openings."""
     low, high = bounds_of(furniture)
@@ -219,7 +221,12 @@ def hang(
 
 
 def hang_free(
-    plan: Plan, furniture: Furniture, *, middle: float, walls: Sequence[int] | None = None, tries: int = TRIES
+    plan: FloorPlan,
+    furniture: Furniture,
+    *,
+    middle: float,
+    walls: Sequence[int] | None = None,
+    tries: int = TRIES,
 ) -> Placed | None:
     """Fix a piece to any free stretch of wall, its middle at height `middle` or above what stands there."""
     low, high = bounds_of(furniture)
@@ -240,7 +247,7 @@ def hang_free(
     return first(tries, attempt)
 
 
-def wall_behind(plan: Plan, thing: Placed) -> Wall | None:
+def wall_behind(plan: FloorPlan, thing: Placed) -> Wall | None:
     """The wall that a piece has its back to, if it is close."""
     for wall in plan.shell.walls:
         away = float(np.dot(np.subtract(thing.position[:2], wall.start), wall.inward))
@@ -255,7 +262,7 @@ def along_wall(wall: Wall, thing: Placed) -> float:
     return float(np.dot(np.subtract(thing.position[:2], wall.start), wall.along))
 
 
-def above(plan: Plan, furniture: Furniture, anchor: Placed, clear: float) -> Placed | None:
+def above(plan: FloorPlan, furniture: Furniture, anchor: Placed, clear: float) -> Placed | None:
     """Fix a piece to the wall behind another, centred on it, `clear` m above its top."""
     wall = wall_behind(plan, anchor)
     if wall is None:
@@ -263,18 +270,20 @@ def above(plan: Plan, furniture: Furniture, anchor: Placed, clear: float) -> Pla
     return hang(plan, furniture, wall, along_wall(wall, anchor), anchor.top + clear)
 
 
-def from_ceiling(plan: Plan, furniture: Furniture, xy: Sequence[float], yaw: float = 0.0) -> Placed | None:
+def from_ceiling(
+    plan: FloorPlan, furniture: Furniture, xy: Sequence[float], yaw: float = 0.0
+) -> Placed | None:
     """Hang a piece from the ceiling."""
     return plan.put(furniture, xy, yaw, z=plan.shell.height - LIFT)
 
 
-def lay_rug(plan: Plan, rug: Furniture, xy: Sequence[float], yaw: float) -> Placed | None:
+def lay_rug(plan: FloorPlan, rug: Furniture, xy: Sequence[float], yaw: float) -> Placed | None:
     """Lay a rug on the floor, where no furniture stands yet."""
     return plan.put(rug, xy, yaw, z=LIFT)
 
 
 def across_from(
-    plan: Plan, furniture: Furniture, anchor: Placed, *, use: float = 0.0, use_but: Sequence[str] = ()
+    plan: FloorPlan, furniture: Furniture, anchor: Placed, *, use: float = 0.0, use_but: Sequence[str] = ()
 ) -> Placed | None:
     """Stand a piece at the wall that another one looks at, opposite to it."""
     half_x, half_y = (float(v) for v in bounds_of(furniture)[1, :2])
@@ -294,7 +303,7 @@ def across_from(
 
 
 def facing(
-    plan: Plan, furniture: Furniture, target: Placed, angle: float, distance: float, *, tilt: float = 0.0
+    plan: FloorPlan, furniture: Furniture, target: Placed, angle: float, distance: float, *, tilt: float = 0.0
 ) -> Placed | None:
     """Stand a piece around another, turned to it.
 

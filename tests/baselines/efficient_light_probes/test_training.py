@@ -11,13 +11,13 @@ import torch
 
 from gibench.baselines.efficient_light_probes.examples import STEP, TURN, Example, cameras_before
 from gibench.baselines.efficient_light_probes.network import GUIDES
-from gibench.baselines.efficient_light_probes.training import Plan, Reconstructing, scale_of
+from gibench.baselines.efficient_light_probes.training import Reconstructing, TrainingPlan, scale_of
 from gibench.baselines.training.checkpoints import Checkpoint
 from gibench.baselines.training.errors import CheckpointError
 from gibench.metrics.lpips_weights import weights_state
 from gibench.rendering.camera import PinholeCamera
 
-PLAN = Plan(epochs=8, crop=16, fusion="modulation", lpips=False, temporal=True, seed=3)
+PLAN = TrainingPlan(epochs=8, crop=16, fusion="modulation", lpips=False, temporal=True, seed=3)
 
 
 def example(seed, size=(24, 32), bright=0.0, noise=0.2):

@@ -11,7 +11,7 @@ from gibench.baselines.glossy_probe_reprojection.gather import (
     NOTHING,
     OTHER_SURFACE,
     Search,
-    Table,
+    TexelTable,
     Wanted,
     best_sample,
     gathered,
@@ -66,7 +66,7 @@ def floor_table(folder, positions, floors=None, ceilings=None, size=(512, 256)):
         reflected_position=(mirrored, np.float32),
         reflected_material_id=(on_floor(lambda probe: (ceilings or {}).get(probe, PAINT)), np.uint16),
     )
-    return Table(probes)
+    return TexelTable(probes)
 
 
 def seen(camera=ABOVE):

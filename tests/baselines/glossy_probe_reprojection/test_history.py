@@ -5,7 +5,7 @@ from __future__ import annotations
 import mitsuba as mi
 import numpy as np
 
-from gibench.baselines.glossy_probe_reprojection.history import Frame, recalled
+from gibench.baselines.glossy_probe_reprojection.history import PastFrame, recalled
 from gibench.baselines.replay import camera_arrays
 from gibench.rendering.camera import PinholeCamera
 from tests.baselines.efficient_light_probes.test_search import floor, rays
@@ -28,7 +28,7 @@ def recall(lift=0.0, material=1, known=True):
     """Colors for the pixels of NOW, whether they were seen, and what they should be."""
     points = floor(*rays(BEFORE, SIZE))[0]
     count = len(points)
-    frame = Frame(
+    frame = PastFrame(
         camera_arrays(BEFORE, SIZE),
         *(mi.Int32(side) for side in SIZE),
         vectors(mi.Color3f, painted(points)),

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from gibench.generators.layouts.placement import LIFT, Plan, RejectedRoom, required
+from gibench.generators.layouts.placement import LIFT, FloorPlan, RejectedRoom, required
 from gibench.generators.layouts.relations import (
     above,
     against_wall,
@@ -37,7 +37,7 @@ def plan():
         skirting=(0.08, 0.015),
         openings=(DOOR, WINDOW),
     )
-    return Plan(shell, "living", np.random.default_rng(0))
+    return FloorPlan(shell, "living", np.random.default_rng(0))
 
 
 def block(family, width, depth, height, mount="floor", supports=()):

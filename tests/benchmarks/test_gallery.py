@@ -1,0 +1,25 @@
+"""The gallery is made from recipes that can be made, and shows what a run holds."""
+
+from __future__ import annotations
+
+import numpy as np
+from PIL import Image
+
+from gibench.benchmarks import gallery
+
+
+def test_every_picture_has_a_recipe_and_a_title():
+    found = gallery.recipes(rooms=20, spp=4)
+    assert list(found) == list(gallery.TITLES)
+    assert (found["rooms"].rooms, found["rooms"].views) == (20, 1)
+    assert {"motion", "curvature", "radiance_cue_3", "reflected_normal"} <= set(found["channels"].channels)
+    assert found["moving-light"].path_moves == "light"
+    assert found["environments"].lighting == "environments"
+
+
+def test_a_wide_picture_is_made_narrow_and_named_on_the_page(tmp_path):
+    wide = Image.fromarray(np.full((100, 3200, 3), 128, dtype=np.uint8))
+    lines = gallery._shown(tmp_path, "rooms", wide, "Rooms.")
+    assert "![Rooms.](rooms.jpg)" in lines
+    with Image.open(tmp_path / "rooms.jpg") as picture:
+        assert picture.size == (gallery.WIDEST, 50)
