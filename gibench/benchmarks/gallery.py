@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 from PIL import Image
 
@@ -34,8 +35,8 @@ TITLES = {
 
 def recipes(*, rooms: int, spp: int) -> dict[str, Recipe]:
     """The datasets of a gallery, by name. rooms: of the first picture. spp: samples a pixel, then denoised."""
-    common = {"spp": spp, "resolution": [192, 144], "channels": ["color"], "rooms": 1}
-    overrides = {
+    common: dict[str, Any] = {"spp": spp, "resolution": [192, 144], "channels": ["color"], "rooms": 1}
+    overrides: dict[str, dict[str, Any]] = {
         "rooms": {"rooms": rooms, "views": 1},
         "channels": {"views": 2, "path": "walk", "lighting": "area-light", "channels": list(SETS)},
         "moving-light": {"views": 6, "path": "walk", "path_moves": "light", "lighting": "area-light"},
@@ -105,8 +106,8 @@ def _methods(results: Results) -> Image.Image:
             tiles.append((image, method, f"{1000 * record['frames'][0]['seconds']:.0f} ms"))
     factor = max(1, -(-192 // tiles[0][0].width))
     size = (tiles[0][0].width * factor, tiles[0][0].height * factor)
-    enlarged = [(image.resize(size, Image.Resampling.NEAREST), *words) for image, *words in tiles]
-    return grid([(image, title, remark) for image, title, remark in enlarged], columns=min(len(enlarged), 5))
+    tiles = [(image.resize(size, Image.Resampling.NEAREST), title, remark) for image, title, remark in tiles]
+    return grid(tiles, columns=min(len(tiles), 5))
 
 
 def _shown(out: Path, name: str, picture: Image.Image, title: str) -> list[str]:
