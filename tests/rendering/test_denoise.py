@@ -9,7 +9,7 @@ import pytest
 
 from gibench.rendering import denoise
 from gibench.rendering.backend import is_scalar, limit_threads
-from gibench.rendering.channels import PARTS
+from gibench.rendering.channels import PARTS, SAMPLED
 from gibench.rendering.render import render_frame
 from gibench.rendering.scene import load_dict
 
@@ -123,3 +123,17 @@ def test_a_frame_says_how_much_denoising_changed():
     changes = [denoise.mean_change(clean.arrays[n], raw.arrays[n]) for n in PARTS if n != "emission"]
     assert clean.denoise_change == max(changes, key=abs)
     assert abs(clean.denoise_change) <= denoise.ALLOWED_CHANGE
+
+
+def test_the_samples_of_a_frame_stay_beside_its_denoised_parts():
+    """They are those of the frame that is not denoised, bit by bit, and take no paths of their own."""
+    options = {"resolution": (24, 16), "spp": 16, "seed": 3}
+    scene = load_dict(scenes.box("coat"))
+    raw = render_frame(scene, scenes.CAMERA, channels=["radiance"], **options)
+    both = render_frame(scene, scenes.CAMERA, channels=["radiance", "samples"], denoise=True, **options)
+    assert both.paths == raw.paths
+    for name, part in SAMPLED.items():
+        np.testing.assert_array_equal(both.arrays[name], raw.arrays[part])
+        assert (both.arrays[part] != raw.arrays[part]).any() or not raw.arrays[part].any()
+    alone = render_frame(scene, scenes.CAMERA, channels=["samples"], **options)
+    assert list(alone.arrays) == list(SAMPLED)
