@@ -15,7 +15,7 @@ import pytest
 from gibench import metrics
 from gibench.rendering.backend import select_variant
 from gibench.rendering.channels import PARTS
-from gibench.rendering.denoise import denoise, denoise_part
+from gibench.rendering.denoise import balanced, denoise, denoise_part
 from gibench.rendering.estimate import estimate_radiance, frame_of
 
 pytestmark = pytest.mark.performance
@@ -34,6 +34,11 @@ STEP = 8
 """Of the path whose frame is rendered."""
 
 NAMES = ("relmse", "rmse_display")
+
+LEAST_ALBEDO = 0.02
+
+BLEND = 0.05
+"""Share of the samples in a reference that is blended with them."""
 
 
 def frames():
@@ -65,6 +70,25 @@ class Rendered:
     def color(self):
         return sum(self.parts.values())
 
+    def mixed(self, other):
+        """The mean of two renderings of as many samples."""
+        both = object.__new__(Rendered)
+        both.parts = {name: 0.5 * (image + other.parts[name]) for name, image in self.parts.items()}
+        both.guides = {name: 0.5 * (image + other.guides[name]) for name, image in self.guides.items()}
+        return both
+
+    @property
+    def demodulated(self):
+        """As `denoised`, but diffuse parts are divided by the albedo for it, where that is not next to black."""
+        albedo = np.where(self.guides["albedo"] > LEAST_ALBEDO, self.guides["albedo"], 1).astype(np.float32)
+        total = self.parts["emission"].copy()
+        for name, image in self.parts.items():
+            if name.endswith("diffuse"):
+                total += balanced(denoise(image / albedo, **self.guides) * albedo, image)
+            elif name != "emission":
+                total += denoise_part(image, **self.guides)
+        return total
+
     @property
     def denoised(self):
         clean = [
@@ -88,6 +112,14 @@ def measured(loaded, camera):
         rows[name, "floor"] = board.error_of_reference(name).mean_square
         half = metrics.evaluate(clean[0], reference, metrics=[name], exposure=exposure)[name]
         rows[name, "halves"] = half**2 if name == "rmse_display" else half
+    whole = halves[0].mixed(halves[1])
+    others = {
+        "denoised together": whole.denoised,
+        "demodulated together": whole.demodulated,
+        "blended": (1 - BLEND) * reference + np.float32(BLEND) * whole.color,
+    }
+    for name in NAMES:
+        rows |= {(name, of): truth.error(name, image).mean_square for of, image in others.items()}
     for spp in METHODS:
         traced = Rendered(loaded, camera, spp, 77 + spp)
         image = denoise(traced.color, **traced.guides)
@@ -128,6 +160,11 @@ def told(name, rows):
             f"  {metric}: reference {true:.3g}, floor {rows[metric, 'floor'] / true:.2f} of it, difference of halves "
             f"{rows[metric, 'halves'] / true:.2f}"
         )
+        of_it = (
+            f"{of} {rows[metric, of] / true:.2f}"
+            for of in ("denoised together", "demodulated together", "blended")
+        )
+        print(f"    made in other ways, of the reference's: {', '.join(of_it)}")
         for spp in METHODS:
             error = rows[metric, spp, "true"]
             board, against = (rows[metric, spp, of] / error - 1 for of in ("board", "reference"))

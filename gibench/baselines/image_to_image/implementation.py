@@ -51,7 +51,7 @@ class IndirectByNetwork(DirectLight):
         learned, apart = held_out(views, HELD_OUT, MOST_HELD_OUT)
         plan = Plan.of(self.settings, training.seed)
         with seeded(plan.seed):
-            network = self.network().to("cuda" if torch.cuda.is_available() else "cpu")
+            network = self.network().to(torch_device())
         examples = [Examples(Frames(views, READ, numbers)) for numbers in (learned, apart)]
         learner = IndirectLight(network, examples[0], examples[1], plan)
         steps = None if training.seconds else EPOCHS * -(-len(learned) // plan.batch)
