@@ -22,3 +22,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         elsewhere = any(item.get_closest_marker(name) for name in ("performance", "stress"))
         if not elsewhere and blas.is_numerical(item.path):
             item.add_marker("blas")
+
+
+@pytest.fixture(scope="session")
+def workplace(tmp_path_factory):
+    """A scheduler's file, and two workers with all threads of the machine that were started by hand."""
+    from tests.clusters import two_workers
+
+    with two_workers(tmp_path_factory.mktemp("dask")) as file:
+        yield file

@@ -18,6 +18,7 @@ from gibench.cli import run
 from gibench.cli.app import app, make_app
 from gibench.datasets import load_preset, load_recipe, open_dataset
 from gibench.datasets.manifest import COLUMNS
+from gibench.errors import GibenchError
 from gibench.generators.furniture import FAMILIES, Family
 from gibench.generators.layouts import dressing
 from gibench.generators.materials import MATERIALS, SLOTS, MaterialFamily, SlotRule
@@ -52,7 +53,8 @@ def command_lines(page: str) -> list[list[str]]:
 
 def commands_of(program: str) -> list[list[str]]:
     pages = ("README.md", "docs/datasets.md", "docs/rooms.md", "docs/cluster.md")
-    return [words for page in pages for words in command_lines(page) if words[0] == program]
+    asked = [words for page in pages for words in command_lines(page) if words[0] == program]
+    return [words for words in asked if words[:3] != ["gibench", "bench", "run"]]
 
 
 def started(words: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
@@ -99,6 +101,37 @@ def test_commands_that_make_datasets_are_understood(home, words, monkeypatch):
         assert recipe.identity() == preset.identity()
     if "--out" in words:
         assert asked[0][0] == Path(words[words.index("--out") + 1])
+
+
+def test_commands_of_the_page_on_clusters_are_understood(tmp_path, monkeypatch):
+    """Those of Dask by the options that it has; the benchmark by what it asks for."""
+    distributed = pytest.importorskip("distributed.cli.dask_worker")
+    from distributed.cli import dask_scheduler, dask_ssh
+
+    known = {
+        "worker": distributed.main,
+        "scheduler": dask_scheduler.main,
+        "ssh": dask_ssh.main,
+    }
+    said = re.findall(r"dask (worker|scheduler|ssh) ([^`\n]*)", page("cluster"))
+    assert {name for name, _ in said} == set(known)
+    for name, words in said:
+        options = {option for parameter in known[name].params for option in parameter.opts}
+        assert set(re.findall(r"--[a-z-]+", words)) <= options, (name, words)
+
+    asked = []
+
+    def instead(root, order, **_):
+        asked.append((str(root), order.cluster))
+        raise GibenchError("asked")
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("gibench.benchmarks.running.run", instead)
+    for words in command_lines("docs/cluster.md"):
+        if words[:3] == ["gibench", "bench", "run"]:
+            run(app, words[1:])
+            assert asked[-1] == (words[words.index("--out") + 1], words[words.index("--cluster") + 1])
+    assert asked
 
 
 @pytest.mark.parametrize(

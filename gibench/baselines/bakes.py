@@ -24,7 +24,7 @@ from gibench.baselines.sources import digest, module_of
 from gibench.baselines.stages import synchronise
 from gibench.baselines.training_set import TrainingSet
 from gibench.datasets.checked import Amount, Checked, Count, parsed
-from gibench.datasets.files import as_json, sync_tree
+from gibench.datasets.files import as_json, process_number, sync_tree
 from gibench.datasets.folder import own_leftovers
 
 RECORD = "bake.json"
@@ -64,6 +64,7 @@ class BakeCache:
         self.root, self._scene, self._machine = root, scene, dict(machine)
         self._views = TrainingSet() if views is None else views
         self.used: list[Bake] = []
+        self.made: list[Bake] = []
         remove_abandoned(root)
 
     def get(
@@ -91,6 +92,7 @@ class BakeCache:
         name = hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()[:24]
         folder = self.root / f"{kind}-{name}"
         record = _whole(folder, key, self._views)
+        is_new = record is None
         if record is None:
             _make(folder, key, make, self._views)
             record = parsed(gate.read_regular(folder / RECORD), BakeRecord)
@@ -98,6 +100,8 @@ class BakeCache:
         self._views.book(record["views"])
         if bake.folder not in [used.folder for used in self.used]:
             self.used.append(bake)
+        if is_new:
+            self.made.append(bake)
         return bake
 
     @staticmethod
@@ -139,7 +143,7 @@ def _size(folder: Path) -> int:
 def _make(
     folder: Path, key: dict[str, Any], make: Callable[[Path], float | None], views: TrainingSet
 ) -> None:
-    with _held(folder.with_name(f".{folder.name}{PARTIAL}{os.getpid()}")) as partial:
+    with _held(folder.with_name(f".{folder.name}{PARTIAL}{process_number()}")) as partial:
         synchronise()
         start = time.perf_counter()
         with views.apart() as handed_out:

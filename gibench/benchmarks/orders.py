@@ -19,7 +19,8 @@ class Order:
     """Order of a command.
 
     methods: with their settings, in the order in which they run. rooms, seeds: None takes the preset's. scenes: keys
-    of a recipe that put scene files in the place of rooms. command: how to do the same again, for the record and for
+    of a recipe that put scene files in the place of rooms. cluster: where all is done, as `cluster.run_tasks` takes it;
+    None is here. command: how to do the same again, for the record and for
     messages.
     """
 
@@ -32,6 +33,7 @@ class Order:
     variant: str = "auto"
     threads: int = field(default_factory=lambda: default_threads(1))
     retry_failed: bool = False
+    cluster: str | None = None
     command: str = ""
 
     @property

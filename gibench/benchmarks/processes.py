@@ -6,6 +6,7 @@ import multiprocessing
 import os
 import signal
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -16,13 +17,20 @@ from gibench.benchmarks import worker
 #: Seconds that a process which takes too long is given to say where it is.
 TRACEBACK_SECONDS = 1.0
 
+#: Seconds between two looks at whether what a process does is still wanted.
+LOOK_SECONDS = 1.0
+
+
+class Unwanted(Exception):
+    """Whoever asked for the results of a process is gone."""
+
 
 class Process:
     """A worker process, gone when the context is left."""
 
-    def __init__(self, task: worker.Task) -> None:
-        """It starts when the context is entered."""
-        self.task = task
+    def __init__(self, task: worker.Task, wanted: Callable[[], bool] = lambda: True) -> None:
+        """It starts when the context is entered. wanted: asked every second."""
+        self.task, self.wanted = task, wanted
 
     def __enter__(self) -> Process:
         context = multiprocessing.get_context("spawn")
@@ -39,8 +47,16 @@ class Process:
         self.connection.close()
 
     def receive(self, limit: float) -> tuple[str, Any]:
-        """The next message; ("lost", reason and traceback) where the process dies or takes over `limit` seconds."""
-        if not self.connection.poll(limit):
+        """The next message; ("lost", reason and traceback) where the process dies or takes over `limit` seconds.
+
+        Raises Unwanted.
+        """
+        end = time.monotonic() + limit
+        while not self.connection.poll(max(0.0, min(LOOK_SECONDS, end - time.monotonic()))):
+            if not self.wanted():
+                raise Unwanted
+            if time.monotonic() < end:
+                continue
             with suppress(OSError):
                 os.kill(self.process.pid or 0, signal.SIGUSR1)
             time.sleep(TRACEBACK_SECONDS)

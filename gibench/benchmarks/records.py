@@ -139,6 +139,7 @@ class Prepare(Checked):
     references: Amount = 0.0
     training: Amount = 0.0
     curves: list[list[Look]] = Field(default_factory=list)
+    beside: Count = 0
 
 
 class Result(Checked):

@@ -33,8 +33,15 @@ from gibench.benchmarks import records
 from gibench.benchmarks.errors import ResultsError
 from gibench.datasets.checked import checked, plain, shown
 from gibench.datasets.errors import FolderError
-from gibench.datasets.files import as_json, sync_folder, write_whole
-from gibench.datasets.folder import lock_folder, own_leftovers, refuse_links, unlock_folder
+from gibench.datasets.files import as_json, process_number, sync_folder, write_whole
+from gibench.datasets.folder import (
+    lock_folder,
+    own_leftovers,
+    refuse_links,
+    remove_empty,
+    remove_tokens,
+    unlock_folder,
+)
 
 #: Version of the layout on disk; a reader refuses what it does not know.
 FORMAT = 1
@@ -98,8 +105,8 @@ class RunFolder:
         return self.results / id
 
     def partial(self, id: str) -> Path:
-        """Folder in which its frames are gathered until all are there."""
-        return self.results / f".{id}.partial"
+        """Folder in which this process gathers its frames until all are there."""
+        return self.results / f".{id}.partial-{process_number()}"
 
     def score_file(self, name: str) -> Path:
         """name: the id of a result, or that of a scene for the reference's own noise."""
@@ -111,6 +118,7 @@ class RunFolder:
 
         Raises FolderError: it cannot be written, holds something else, or is in use.
         """
+        made = [folder for folder in (self.root, *self.root.parents) if not folder.exists()]
         try:
             self.root.mkdir(parents=True, exist_ok=True)
             refuse_links(self.root, self._written())
@@ -131,6 +139,7 @@ class RunFolder:
         finally:
             self.remove_partials()
             unlock_folder(self.root, lock)
+            remove_empty(made)
 
     def _written(self) -> list[Path]:
         """Every folder that a command writes to or deletes from."""
@@ -146,11 +155,12 @@ class RunFolder:
 
         Nothing goes but what carries a result's or a file's own names, and nothing behind a link.
         """
-        for left in own_leftovers(self.results, rf"\.{ID}\.partial"):
-            _remove_frames(left)
+        remove_tokens(self.root)
+        for left in own_leftovers(self.results, rf"\.{ID}\.partial(-[0-9]+)?"):
+            remove_frames(left)
         for left in own_leftovers(self.results, ID):  # its frames came, its record did not
             if not os.path.lexists(self.result_file(left.name)):
-                _remove_frames(left)
+                remove_frames(left)
         for scene in own_leftovers(self.root / "bakes", r"[^/.][^/]*"):
             remove_abandoned(scene)
         for place in (self.root.resolve(), self.results, self.scores):
@@ -158,15 +168,18 @@ class RunFolder:
                 if not gate.real_folder(left):
                     left.unlink(missing_ok=True)
 
-    def write_result(self, record: Mapping[str, Any]) -> None:
-        """Write a result, and move its frames to their place where it has some. Raises OSError."""
+    def write_result(self, record: Mapping[str, Any], partial: Path | None = None) -> None:
+        """Write a result, and move its frames to their place where it has some. Raises OSError.
+
+        partial: where they were gathered, by default by this process.
+        """
         self.results.mkdir(exist_ok=True)
-        partial = self.partial(record["id"])
+        partial = self.partial(record["id"]) if partial is None else partial
         if record["status"] == "ok":
             os.replace(partial, self.predictions(record["id"]))
             sync_folder(self.results)
         else:
-            _remove_frames(partial)
+            remove_frames(partial)
         write_whole(self.result_file(record["id"]), as_json(record))
 
     def put_aside(self, id: str) -> None:
@@ -234,7 +247,7 @@ class RunFolder:
         write_whole(self.run_file, as_json(run))
 
 
-def _remove_frames(folder: Path) -> None:
+def remove_frames(folder: Path) -> None:
     """Remove the frames of a result and their folder; anything else in it stays, and so does the folder then."""
     for frame in own_leftovers(folder, r"[0-9]{4,}\.exr"):
         if not gate.real_folder(frame):

@@ -3,30 +3,31 @@
 from __future__ import annotations
 
 import errno
+import os
 import time
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gibench
 from gibench.benchmarks import machine as machines
-from gibench.benchmarks import outcomes, worker
+from gibench.benchmarks import serving, worker
 from gibench.benchmarks.code_version import code_version
 from gibench.benchmarks.errors import Interrupted, ResultsError, RunError
 from gibench.benchmarks.orders import Order
 from gibench.benchmarks.outcomes import Job
-from gibench.benchmarks.processes import Process
 from gibench.benchmarks.registry import Found
 from gibench.benchmarks.result_files import FORMAT, RunFolder, key_of
 from gibench.benchmarks.scenes import SceneFiles, refuse_files_outside, scene_name, scenes_in
 from gibench.benchmarks.settings import Choice, base_settings
+from gibench.datasets.errors import MakingError
 from gibench.datasets.making import Progress, make
 
-#: Seconds that a process may take until renderer and scene are loaded.
-STARTUP_SECONDS = 600.0
+if TYPE_CHECKING:
+    from gibench.benchmarks.on_cluster import Crew
 
 #: What a run's time goes to; the rest of it is the harness.
 SPENT = ("scenes", "prepare", "render", "score")
@@ -37,7 +38,8 @@ class State:
     """Progress of a run, for whoever watches.
 
     panoramas: how many of the rooms that light views are there, and of how many. record: of the result that has just
-    been written. training: what a training on rooms that has just ended took.
+    been written. training: what a training on rooms that has just ended took. remark: something that the user should
+    know.
     """
 
     done: int = 0
@@ -47,6 +49,7 @@ class State:
     training: dict[str, Any] | None = None
     scenes: Progress | None = None
     panoramas: tuple[int, int] | None = None
+    remark: str = ""
 
 
 @dataclass(frozen=True)
@@ -54,21 +57,28 @@ class Report:
     """Result of a run. ids: of all results that were asked for. made, failed: how many now.
 
     seconds: of all of it, by what they were spent on; "harness" is what is neither scenes, preparing, rendering nor
-    scoring.
+    scoring. workers: of a cluster, over which preparing and rendering are sums; 0 where there was none.
     """
 
     ids: tuple[str, ...]
     made: int
     failed: tuple[str, ...]
     seconds: dict[str, float]
+    workers: int = 0
 
 
 class Run:
     """A run over one folder, whose lock is held by `RunFolder.claimed`."""
 
-    def __init__(self, folder: RunFolder, order: Order, on_state: Callable[[State], None]) -> None:
-        """Nothing happens yet."""
-        self.folder, self.order, self.on_state = folder, order, on_state
+    def __init__(
+        self,
+        folder: RunFolder,
+        order: Order,
+        on_state: Callable[[State], None],
+        cluster: Crew | None = None,
+    ) -> None:
+        """Nothing happens yet. cluster: who does it instead of processes of this one."""
+        self.folder, self.order, self.on_state, self.cluster = folder, order, on_state, cluster
         self.state = State()
         self.spent = dict.fromkeys(SPENT, 0.0)
         self.started = time.perf_counter()
@@ -86,7 +96,10 @@ class Run:
         """Look at the machine, make the scenes, write `run.json`."""
         order = self.order
         self._check_identity()
-        self.facts = machines.examine(order.variant, order.threads)
+        if self.cluster is None:
+            self.facts = machines.examine(order.variant, order.threads)
+        else:
+            self.facts = self.cluster.examined(self)
         self.machine = machines.digest(self.facts)
         self._write_run()
         began = time.perf_counter()
@@ -205,7 +218,12 @@ class Run:
 
         (self.folder.root / "scenes").mkdir(exist_ok=True)
         make(
-            self.folder.dataset(which), recipe, variant=order.variant, command=order.command, on_progress=tell
+            self.folder.dataset(which),
+            recipe,
+            variant=order.variant,
+            cluster=None if self.cluster is None else self.cluster.place,
+            command=order.command,
+            on_progress=tell,
         )
         self.state.scenes = None
 
@@ -252,12 +270,32 @@ class Run:
         for job in waiting:
             baked = job.found.method.baked_settings(job.choice.settings)
             groups.setdefault((job.scene.name, job.found.method.id, job.seed, repr(baked)), []).append(job)
-        for group in groups.values():
-            if self._is_trained(group[0], jobs):
-                while group:
-                    group = group[self._serve(group) :]
-            else:
-                self.state.done += len(group)
+        if self.cluster is None:
+            for group in groups.values():
+                if self._is_trained(group[0], jobs):
+                    while group:
+                        group = group[self._serve(group) :]
+                else:
+                    self._leave_out(group)
+        else:
+            firsts = [g[0] for g in groups.values() if self._is_to_be_trained(g[0], jobs)]
+            self.cluster.train(self, list({key_of_training(job): job for job in firsts}.values()))
+            ready = []
+            for group in groups.values():
+                if self.trainings.get(key_of_training(group[0]), True):
+                    ready.append(group)
+                else:
+                    self._leave_out(group)
+            self.cluster.serve(self, ready)
+
+    def _leave_out(self, group: Sequence[Job]) -> None:
+        self.state.done += sum(job.id not in self.failed for job in group)
+
+    def remark(self, text: str) -> None:
+        """Tell something that the user should know."""
+        self.state.remark = text
+        self.on_state(self.state)
+        self.state.remark = ""
 
     def _is_there(self, job: Job) -> bool:
         if not self.folder.result_file(job.id).exists():
@@ -276,45 +314,39 @@ class Run:
 
         A training that failed is told once, by the first result that would have used it; the others are not tried.
         """
-        method = job.found.method
-        if not (method.trains and self.order.track.prepare_on == "rooms"):
-            return True
+        if self._is_to_be_trained(job, jobs):
+            self.trained(
+                job,
+                serving.train(self.task([job], None), job, self.facts, self.limits, self.keep, self.spend),
+            )
+        return self.trainings.get(key_of_training(job), True)
 
-        def key_of_training(one: Job) -> tuple[Any, ...]:
-            knobs = one.found.method.trained_settings(one.choice.settings)
-            return one.found.method.id, one.seed, repr(knobs), str(one.config["code"])
-
+    def _is_to_be_trained(self, job: Job, jobs: Sequence[Job]) -> bool:
+        """Whether a result needs a training on rooms that was tried neither by this command nor, in vain, before."""
+        if not (job.found.method.trains and self.order.track.prepare_on == "rooms"):
+            return False
         key = key_of_training(job)
-        if key not in self.trainings:
-            alike = [one for one in jobs if key_of_training(one) == key]
-            self.trainings[key] = not any(self._failed_in_training(one) for one in alike) and self._train(job)
-        return self.trainings[key]
+        if key in self.trainings:
+            return False
+        alike = [one for one in jobs if key_of_training(one) == key]
+        if any(self._failed_in_training(one) for one in alike):
+            self.trainings[key] = False
+        return key not in self.trainings
+
+    def trained(self, job: Job, took: dict[str, Any] | None) -> None:
+        """Take what the training took that a result needs; None where it failed."""
+        self.trainings[key_of_training(job)] = took is not None
+        if took is not None:
+            self.state.training = took
+            self.on_state(self.state)
+            self.state.training = None
 
     def _failed_in_training(self, job: Job) -> bool:
         path = self.folder.result_file(job.id)
         return path.exists() and self.folder.read_result(job.id).get("phase") == "train"
 
-    def _train(self, job: Job) -> bool:
-        """Start a process that trains on rooms; whether it came to an end."""
-        task = self._task([job], scene=None)
-        with Process(task) as process:
-            clock = time.perf_counter()
-            kind, content = process.receive(STARTUP_SECONDS)
-            if kind == "ready":
-                kind, content = process.receive(self.order.size.budget.prepare)
-            self.spent["prepare"] += time.perf_counter() - clock
-        if kind == "trained":
-            task.log.unlink(missing_ok=True)
-            self.state.training = {"method": job.found.method.id, "seed": job.seed, **content}
-            self.on_state(self.state)
-            self.state.training = None
-            return True
-        if kind == "storage":
-            raise OSError(errno.ENOSPC, "the disk is full", content)
-        self._keep(outcomes.bad(job, self.facts, "train", content, None, task.log))
-        return False
-
-    def _task(self, group: Sequence[Job], scene: SceneFiles | None) -> worker.Task:
+    def task(self, group: Sequence[Job], scene: SceneFiles | None) -> worker.Task:
+        """What the process of some results of one preparation does; without a scene it trains."""
         first, order = group[0], self.order
         self.folder.logs.mkdir(exist_ok=True)
         method = first.found.method
@@ -333,52 +365,28 @@ class Run:
             parts=order.track.parts,
             warmup=order.size.warmup,
             variant=self.facts["variant"],
-            threads=order.threads,
+            threads=self.facts["threads"],
             log=self.folder.logs / f"{first.id}.log",
         )
 
     def _serve(self, group: list[Job]) -> int:
         """Start a process for some results of one preparation; returns how many are there now, at least one."""
-        task = self._task(group, group[0].scene)
-        limits = {
-            "start": STARTUP_SECONDS,
-            "prepare": self.order.size.budget.prepare,
-            "render": self.order.size.budget.render,
-        }
-        with Process(task) as process:
-            served, prepared = 0, None
-            phase, clock = "start", time.perf_counter()
-            while True:
-                kind, content = process.receive(limits[phase])
-                spent = time.perf_counter() - clock
-                clock = time.perf_counter()
-                if kind == "ready":
-                    phase = "prepare"
-                elif kind == "prepared":
-                    self.spent["prepare"] += content["wall_seconds"]
-                    prepared, phase = content, "render"
-                elif kind == "result":
-                    self.spent["render"] += content["warmup_seconds"] + sum(
-                        f["seconds"] for f in content["frames"]
-                    )
-                    self._keep(outcomes.good(group[served], self.facts, prepared or {}, content))
-                    served += 1
-                elif kind == "done":
-                    task.log.unlink(missing_ok=True)
-                    return served
-                elif kind == "storage":
-                    raise OSError(errno.ENOSPC, "the disk is full", content)
-                else:  # failed, died or too late
-                    if phase != "start":
-                        self.spent[phase] += spent
-                    # A preparation that fails, fails for all settings that it was for.
-                    lost = group[served : served + 1] if phase == "render" else group
-                    for job in lost:
-                        self._keep(outcomes.bad(job, self.facts, phase, content, prepared, task.log))
-                    return served + len(lost)
+        task = self.task(group, group[0].scene)
+        return serving.serve(task, group, self.facts, self.limits, self.keep, self.spend)
 
-    def _keep(self, record: dict[str, Any]) -> None:
-        self.folder.write_result(record)
+    @property
+    def limits(self) -> serving.Limits:
+        """Seconds that the processes may take."""
+        budget = self.order.size.budget
+        return serving.Limits(budget.prepare, budget.render)
+
+    def spend(self, what: str, seconds: float) -> None:
+        """Book seconds under one of `SPENT`."""
+        self.spent[what] += seconds
+
+    def keep(self, record: dict[str, Any], partial: Path | None = None) -> None:
+        """Write a result and tell of it. partial: see `RunFolder.write_result`."""
+        self.folder.write_result(record, partial)
         (self.made if record["status"] == "ok" else self.failed).append(record["id"])
         self.state.done += 1
         self.state.failed = len(self.failed)
@@ -389,7 +397,8 @@ class Run:
     def finish(self, ids: Sequence[str]) -> Report:
         """Write down what was done and what it took."""
         seconds = self.keep_record(ended=True)
-        return Report(tuple(ids), len(self.made), tuple(self.failed), seconds)
+        workers = 0 if self.cluster is None else self.cluster.workers
+        return Report(tuple(ids), len(self.made), tuple(self.failed), seconds, workers)
 
     def keep_record(self, *, ended: bool) -> dict[str, float]:
         """Write down what this command has done so far, and return its seconds. A killed one leaves that it began."""
@@ -402,6 +411,7 @@ class Run:
             "began": self.began.isoformat(timespec="seconds"),
             "ended": ended,
             "machine": self.machine,
+            **({} if self.cluster is None else {"workers": self.cluster.workers}),
             "made": len(self.made),
             "failed": len(self.failed),
             "seconds": seconds,
@@ -409,6 +419,12 @@ class Run:
         self.run["runs"] = [*self.before, record]
         self.folder.write_run(self.run)
         return seconds
+
+
+def key_of_training(job: Job) -> tuple[Any, ...]:
+    """What results that use the same training on rooms have in common."""
+    knobs = job.found.method.trained_settings(job.choice.settings)
+    return job.found.method.id, job.seed, repr(knobs), str(job.config["code"])
 
 
 def run(
@@ -425,12 +441,13 @@ def run(
     `order.methods`, and says which (see `equal_time`). score: called when they are there, its time is that of scoring.
     on_state: told of every step.
 
-    Raises FolderError, ResultsError, TrackError, MethodError before anything is made; RunError and Interrupted
-    half-way, when the same call continues.
+    Raises FolderError, ResultsError, TrackError, MethodError, ClusterError before anything is made; RunError,
+    MakingError and Interrupted half-way, when the same call continues.
     """
-    folder = RunFolder(root)
-    with folder.claimed():
-        doing = Run(folder, order, on_state)
+    # Workers of a cluster start in folders of their own.
+    folder = RunFolder(root if order.cluster is None else Path(os.path.abspath(root)))
+    with folder.claimed(), _crew(order) as crew:
+        doing = Run(folder, order, on_state, crew)
         try:
             doing.prepare()
             if work is not None:
@@ -449,10 +466,26 @@ def run(
             done = f"{doing.state.done} of {doing.state.of} results" if doing.state.of else "no result"
             again = f"to continue run `{order.command}`" if order.command else "the same call continues"
             raise Interrupted(f"stopped with {done} there; {again}") from None
+        except MakingError:
+            with suppress(OSError):
+                doing.keep_record(ended=False)
+            raise
         except OSError as problem:
             with suppress(OSError):
                 doing.keep_record(ended=False)
             raise RunError(_why(root, problem)) from None
+
+
+@contextmanager
+def _crew(order: Order) -> Iterator[Crew | None]:
+    if order.cluster is None:
+        yield None
+        return
+    from gibench.benchmarks.on_cluster import Crew
+    from gibench.datasets.cluster_opening import opened
+
+    with opened(order.cluster) as place:
+        yield Crew(place)
 
 
 def _why(root: Path, problem: OSError) -> str:

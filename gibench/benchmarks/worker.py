@@ -7,6 +7,8 @@ name and a content.
     ("ready", seconds)      the renderer and the scene are loaded
     ("trained", dict)       times of the training
     ("prepared", dict)      times of the preparation
+    ("waits", None)         until it has the machine to itself, where several workers share one
+    ("alone", None)         it has
     ("result", dict)        one setting is done; its frames lie in its partial folder
     ("failed", dict)        reason, traceback; the process ends
     ("storage", str)        the disk refuses; the process ends
@@ -41,7 +43,7 @@ from gibench.baselines.sources import digest
 from gibench.baselines.stages import Stages, synchronise
 from gibench.baselines.trained import trained
 from gibench.baselines.training_set import TrainingSet, training_set
-from gibench.benchmarks import predictions
+from gibench.benchmarks import predictions, turns
 from gibench.benchmarks.costs import preparation
 from gibench.benchmarks.memory import gpu_peak_mb, peak_mb, reset_peak
 from gibench.benchmarks.scenes import SceneFiles, lay_out
@@ -67,7 +69,8 @@ class Task:
     the same baked settings. training: root of the dataset of training views, None where the method reads none. rooms:
     where what is trained on rooms is kept; None on tracks that train for each scene. site: folder for the files of the
     scene that a method may see. bakes: root of the cache. machine: what bakes depend on beside the scene. seconds: of a
-    training. parts: of the image that are scored. log: where output and tracebacks of crashes go.
+    training. parts: of the image that are scored. log: where output and tracebacks of crashes go. turn: see `turns`;
+    None where no other worker is on the machine.
     """
 
     method: Method
@@ -85,6 +88,7 @@ class Task:
     variant: str
     threads: int
     log: Path
+    turn: Path | None = None
 
 
 def method_seed(seed: int, room: int, *more: int) -> int:
@@ -156,11 +160,12 @@ class _Session:
     def _train(self, started: float) -> None:
         """Train on rooms; whoever prepares for a scene finds the weights."""
         views, cache = on_rooms(self.task)
-        self.connection.send(("ready", time.perf_counter() - started))
-        reset_peak()
-        started = time.perf_counter()
-        bake = weights_of(self.task, cache, views, room=None)
-        wall = time.perf_counter() - started
+        with turns.beside(self.task.turn):
+            self.connection.send(("ready", time.perf_counter() - started))
+            reset_peak()
+            started = time.perf_counter()
+            bake = weights_of(self.task, cache, views, room=None)
+            wall = time.perf_counter() - started
         cost = preparation(wall, {}, [bake], [bake], [views])
         self.connection.send(("trained", {**cost, "peak_mb": peak_mb(), "gpu_mb": gpu_peak_mb()}))
 
@@ -217,24 +222,24 @@ class _SceneSession:
         implementation_class = task.method.load()
         # Read the sources that bakes are keyed by outside of the clock.
         digest(implementation_class.__module__)
-        self.connection.send(("ready", time.perf_counter() - started))
+        with turns.beside(task.turn):
+            self.connection.send(("ready", time.perf_counter() - started))
 
-        before = {bake.name for cache in caches for bake in _inside(cache.root)}
-        reset_peak()
-        synchronise()
-        started = time.perf_counter()
-        if task.method.trains:
-            room = files.room if task.rooms is None else None
-            weights = weights_of(task, caches[-1], views[-1], room)
-            site = replace(site, weights=weights.folder)
-        implementation = implementation_class(task.settings[0][0])
-        implementation.prepare(site)
-        synchronise()
-        wall = time.perf_counter() - started
-        used = [bake for cache in caches for bake in cache.used]
-        made = [bake for bake in used if bake.folder.name not in before]
-        prepared = preparation(wall, stages.seconds, used, made, views)
-        self.connection.send(("prepared", {**prepared, "peak_mb": peak_mb(), "gpu_mb": gpu_peak_mb()}))
+            reset_peak()
+            synchronise()
+            started = time.perf_counter()
+            if task.method.trains:
+                room = files.room if task.rooms is None else None
+                weights = weights_of(task, caches[-1], views[-1], room)
+                site = replace(site, weights=weights.folder)
+            implementation = implementation_class(task.settings[0][0])
+            implementation.prepare(site)
+            synchronise()
+            wall = time.perf_counter() - started
+            used = [bake for cache in caches for bake in cache.used]
+            made = [bake for cache in caches for bake in cache.made]
+            prepared = preparation(wall, stages.seconds, used, made, views)
+            self.connection.send(("prepared", {**prepared, "peak_mb": peak_mb(), "gpu_mb": gpu_peak_mb()}))
 
         for number, (settings, frames) in enumerate(task.settings):
             if number:
@@ -242,7 +247,14 @@ class _SceneSession:
                 if adjust is None:
                     return
                 adjust(settings)
-            self.connection.send(("result", self._rendered(implementation, frames)))
+            with turns.alone(task.turn, self._waits):
+                if task.turn is not None:
+                    self.connection.send(("alone", None))
+                result = self._rendered(implementation, frames)
+            self.connection.send(("result", result))
+
+    def _waits(self) -> None:
+        self.connection.send(("waits", None))
 
     def _rendered(self, implementation: Any, folder: Path) -> dict[str, Any]:
         """Render the frames, the clock around every call; check and keep each frame outside of it."""
@@ -315,10 +327,6 @@ class _SceneSession:
             index=frame,
             seed=method_seed(self.task.seed, self.scene.room, frame),
         )
-
-
-def _inside(folder: Path) -> list[Path]:
-    return list(folder.iterdir()) if folder.is_dir() else []
 
 
 def _number(value: Any) -> float | None:

@@ -53,6 +53,10 @@ def run_track(
         str | None, typer.Option(help="Such as 0,1,2, for trained methods.", show_default="the preset's")
     ] = None,
     variant: Annotated[str, typer.Option(help="Mitsuba's, or auto: the fastest that works.")] = "auto",
+    cluster: Annotated[
+        str | None,
+        typer.Option(help="Run on Dask: a scheduler's address or file, or local:N.", show_default=False),
+    ] = None,
     retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Try failed results again.")] = False,
     no_score: Annotated[
         bool, typer.Option("--no-score", help="Leave scoring to `gibench bench score`.")
@@ -96,6 +100,7 @@ def run_track(
         "--equal-time": equal_time,
         "--seeds": seeds,
         "--variant": None if variant == "auto" else variant,
+        "--cluster": cluster,
     }
     words = [str(word) for option, value in given.items() if value is not None for word in (option, value)]
     words += scene_words(scene, up, scale, allow_missing, allow_outside, define)
@@ -109,6 +114,7 @@ def run_track(
         seeds=None if seeds is None else _seeds(seeds),
         variant=variant,
         retry_failed=retry_failed,
+        cluster=cluster,
         command=shlex.join(["gibench", "bench", "run", *words]),
     )
     scored: list[Scored] = []

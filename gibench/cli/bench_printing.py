@@ -33,7 +33,9 @@ class RunPrinter:
     def show(self, state: State) -> None:
         """Say what is new."""
         record = state.record
-        if record is not None:
+        if state.remark:
+            self._line(state.remark)
+        elif record is not None:
             place = f"[{state.done:>{len(str(state.of))}}/{state.of}] {record['config']['scene']}"
             self._line(f"{place} {_cut(record['label'], 32):<32} {_outcome(record)}")
         elif (training := state.training) is not None:
@@ -66,8 +68,12 @@ def print_run(root: Path, report: Report) -> None:
     spent = {"scenes": "scenes", "prepare": "preparing", "render": "rendering", "score": "scoring"}
     parts = ", ".join(f"{word} {duration(seconds[name])}" for name, word in spent.items())
     text = f"{duration(seconds['total'])}: {parts}"
+    if report.workers:
+        text += f"; preparing and rendering summed over {report.workers} workers"
     for number, line in enumerate(textwrap.wrap(text, 80 - 14)):
         _row("time" if number == 0 else "", line)
+    if report.workers:
+        return
     share = 100 * seconds["harness"] / max(seconds["total"], 1e-9)
     _row("harness", f"{duration(seconds['harness'])}, {share:.1f} % of the run")
 

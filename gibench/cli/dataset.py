@@ -182,6 +182,7 @@ def make(
 def verify(folder: Folder) -> None:
     """Check a dataset: hashes, completeness, finite values, color equal to the sum of its parts."""
     from gibench.cli.progress import counting
+    from gibench.datasets.manifest import processors_told, read_manifest
     from gibench.datasets.verifying import verify as problems_of
 
     with counting("rooms checked") as on_room:
@@ -192,6 +193,8 @@ def verify(folder: Folder) -> None:
         files = len({problem.file for problem in problems})
         say(f"error: {len(problems)} problems in {files} files of {folder}", err=True)
         raise typer.Exit(1)
+    if processors := processors_told(read_manifest(folder)):
+        say(f"processors: {processors}")
     say(f"{folder} is whole: every file is as it was written, every frame keeps the channel contract")
 
 

@@ -12,6 +12,7 @@ from gibench.datasets.checked import parsed
 from gibench.datasets.estimating import estimate
 from gibench.datasets.folder import room_folder, whole_rooms
 from gibench.datasets.making import make
+from gibench.datasets.manifest import processors_told
 from gibench.datasets.recipes import Recipe
 from gibench.datasets.records import Described, Polished
 
@@ -84,6 +85,8 @@ def describe(root: Path, manifest: dict[str, Any]) -> None:
                     f"{worst['room']}, view {worst['view']}: {100 * worst['change']:+.0f} %. More samples help",
                 )
             )
+        if processors := processors_told(manifest):
+            say(_row("processors", processors))
         if totals["invalid_paths"]:
             say(_row("invalid paths", f"{totals['invalid_paths']}, counted as 0"))
     _print_rejections(manifest.get("rejections", {}), manifest["rejected_rooms"])

@@ -4,8 +4,20 @@ from __future__ import annotations
 
 import json
 import os
+import secrets
+from functools import cache
 from pathlib import Path
 from typing import Any
+
+
+def process_number() -> int:
+    """A number of this process that no other has: machines that share a folder repeat the numbers of processes."""
+    return _number(os.getpid())
+
+
+@cache
+def _number(process: int) -> int:
+    return int(f"{secrets.randbelow(10**9) + 1}{process:07d}")
 
 
 def write_whole(path: Path, content: bytes) -> None:
@@ -13,7 +25,7 @@ def write_whole(path: Path, content: bytes) -> None:
 
     Raises OSError; nothing is left behind then.
     """
-    beside = path.with_name(f".{path.name}.partial-{os.getpid()}")
+    beside = path.with_name(f".{path.name}.partial-{process_number()}")
     try:
         with open(beside, "wb", opener=through_no_link) as file:
             file.write(content)

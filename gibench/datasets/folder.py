@@ -22,6 +22,9 @@ RECORD = "frames.json"
 LOCK = ".lock"
 ENVIRONMENTS = "environments"
 
+#: Beginning of the name of a file by which workers of a cluster prove that they see a folder.
+TOKEN = ".cluster-"
+
 
 def room_folder(root: Path, room: int) -> Path:
     """Folder of a whole room."""
@@ -55,10 +58,18 @@ def remove_partials(root: Path, room: int | None = None) -> None:
     if room is None:
         for left in own_leftovers(root / ENVIRONMENTS, r"\.[0-9a-f]{64}\.exr\.partial-[0-9]+"):
             left.unlink(missing_ok=True)
+        remove_tokens(root)
         names = "|".join(map(re.escape, (MANIFEST, TABLE, PREVIEW)))
         for left in own_leftovers(root.resolve(), rf"\.({names})\.partial-[0-9]+"):
             if not gate.real_folder(left):
                 left.unlink(missing_ok=True)
+
+
+def remove_tokens(root: Path) -> None:
+    """Remove what killed runs on clusters left, so that workers which still do their tasks stop."""
+    for left in own_leftovers(root.resolve(), rf"{re.escape(TOKEN)}[0-9a-f]{{16}}\.partial-[0-9]+"):
+        if not gate.real_folder(left):
+            left.unlink(missing_ok=True)
 
 
 def own_leftovers(folder: Path, pattern: str) -> list[Path]:
@@ -74,7 +85,7 @@ def remove_empty_dataset(root: Path) -> None:
         (root / name).unlink(missing_ok=True)
     for panorama in own_leftovers(root / ENVIRONMENTS, r"[0-9a-f]{64}\.exr"):
         panorama.unlink()
-    _remove_empty([root / ENVIRONMENTS, root / "rooms"])
+    remove_empty([root / ENVIRONMENTS, root / "rooms"])
 
 
 @contextmanager
@@ -93,7 +104,7 @@ def claimed(root: Path) -> Iterator[None]:
             _refuse_foreign(root)
         lock = lock_folder(root)
     except OSError as problem:
-        _remove_empty(made)
+        remove_empty(made)
         raise FolderError(_why_not(root, problem)) from None
     try:
         remove_partials(root)
@@ -101,13 +112,13 @@ def claimed(root: Path) -> Iterator[None]:
     finally:
         remove_partials(root)
         unlock_folder(root, lock)
-        _remove_empty(made)
+        remove_empty(made)
 
 
 def _refuse_foreign(root: Path) -> None:
     # `rooms` without a manifest is not ours: the manifest is written before the first room.
     foreign = sorted(
-        entry.name for entry in root.iterdir() if not entry.name.startswith((LOCK, f".{MANIFEST}."))
+        entry.name for entry in root.iterdir() if not entry.name.startswith((LOCK, f".{MANIFEST}.", TOKEN))
     )
     if foreign:
         raise FolderError(
@@ -169,7 +180,8 @@ def unlock_folder(root: Path, lock: FileLock) -> None:
     lock.release()
 
 
-def _remove_empty(folders: Iterable[Path]) -> None:
+def remove_empty(folders: Iterable[Path]) -> None:
+    """Remove folders, one inside the next, as far as they are empty."""
     for folder in folders:
         with suppress(OSError):
             folder.rmdir()

@@ -83,7 +83,7 @@ def make(
 
     root: its folder; new, empty, or holding a dataset of the same recipe. workers: processes that render at
     the same time; pixels do not depend on it. cluster: where rooms are made instead, see
-    `cluster.run_rooms`. command: how to do the same again, for the record and for
+    `cluster.run_tasks`. command: how to do the same again, for the record and for
     messages. work: what workers do, by default `RoomMaker` under the `Renderer` of `variant`.
 
     Raises `FolderError`, `RecipeError` before anything is made; `MakingError` and `Interrupted` half-way,
@@ -92,6 +92,8 @@ def make(
     if not 1 <= workers <= pool.MOST_WORKERS:
         raise MakingError(f"{workers} workers are not possible: ask for 1 to {pool.MOST_WORKERS}")
     started = time.perf_counter()
+    if cluster is not None:
+        root = Path(os.path.abspath(root))  # workers start in folders of their own
     work = work or pool.Work(Renderer(variant, default_threads(workers), recipe), RoomMaker(root, recipe))
     with folder.claimed(root):
         run = _Run(root, recipe, command, on_progress)
@@ -161,11 +163,11 @@ class _Run:
     def do(self, work: pool.Work, workers: int, cluster: str | None) -> None:
         self.on_progress(self.progress)
         if self.rooms and cluster is not None:
-            from gibench.datasets.cluster import run_rooms
+            from gibench.datasets.cluster import run_tasks
 
             # What a dead worker left of a room is removed at the end: another may be making it by now.
             listener = pool.Listener(self._ready, self._message, self._done, self._forget_frames, self._told)
-            run_rooms(work, self.rooms, listener, cluster=cluster, root=self.root)
+            run_tasks(work, self.rooms, listener, cluster=cluster, root=self.root)
         elif self.rooms:
             listener = pool.Listener(self._ready, self._message, self._done, self._died, self._told)
             pool.run_rooms(work, self.rooms, listener, workers=min(workers, len(self.rooms)))

@@ -167,6 +167,7 @@ def gathered(root: Path, manifest: Mapping[str, Any]) -> tuple[dict[str, Any], p
         },
         "median_error": float(table["median_error"].median()) if len(table) else None,
         "denoise_changes": large_changes(table),
+        "processors": {name: int(count) for name, count in table["processor"].value_counts().items()},
         "splits": {split: int((table["split"] == split).sum()) for split in recipe.splits},
     }
     if totals["median_error"] != totals["median_error"]:  # no frame has samples enough for an error
@@ -190,19 +191,30 @@ def large_changes(table: pd.DataFrame) -> list[dict[str, Any]]:
     return [{"room": int(room), "view": int(view), "change": change} for room, view, change in rows]
 
 
+def processors_told(manifest: Mapping[str, Any]) -> str:
+    """Say that processors of several kinds made a dataset, and how many frames each; empty where they did not.
+
+    They round differently: the last bits of their pixels may differ, and what follows from them.
+    """
+    counts = (manifest.get("totals") or {}).get("processors", {})
+    if len(counts) < 2:
+        return ""
+    listed = ", ".join(f"{name or 'unknown'} {count}" for name, count in counts.items())
+    return f"{len(counts)} kinds ({listed} frames): the last bits of pixels may differ between them"
+
+
 def frame_table(records: Iterable[Mapping[str, Any]], recipe: Recipe) -> pd.DataFrame:
     """Return a row a frame, in the order of rooms and views.
 
-    Columns: room, view, split, kind, file (from the dataset's folder), sha256, bytes, width, height,
-    camera_x … z and target_x … z (m), fov (horizontal, rad), up_x … z (NaN: Z is up), principal_point_x, y (from the
-    middle of the image to the right and down, as shares of its width and height), mirrored (0 or 1), path, step,
-    exposure (for display), largest
-    (value of color), spp, paths, invalid_paths (counted as 0), median_error (relative standard error of
-    color, before denoising), kernel_seconds, denoise_seconds, denoise_change (by how much denoising changed the mean
-    of a part, where it is most), seconds (all of the renderer's time), seed. Where frames have light of their own, also
-    those of `lightings.COLUMNS`: lighting ("area-light" or "environment"), light_x … z (centre, m), light_direction_x …
-    z, light_up_x … z (unit), light_width, light_height (m), light_red … blue (radiance), environment (its name),
-    environment_sha256 (of its pixels), environment_rotation (about Z, rad).
+    Columns: room, view, split, kind, file (from the dataset's folder), sha256, bytes, width, height, camera_x … z and
+    target_x … z (m), fov (horizontal, rad), up_x … z (NaN: Z is up), principal_point_x, y (from the middle of the image
+    to the right and down, as shares of its width and height), mirrored (0 or 1), path, step, exposure (for display),
+    largest (value of color), spp, paths, invalid_paths (counted as 0), median_error (relative standard error of color,
+    before denoising), kernel_seconds, denoise_seconds, denoise_change (by how much denoising changed the mean of a
+    part, where it is most), seconds (all of the renderer's time), seed, processor (that rendered it). Where frames have
+    light of their own, also those of `lightings.COLUMNS`: lighting ("area-light" or "environment"), light_x … z
+    (centre, m), light_direction_x … z, light_up_x … z (unit), light_width, light_height (m), light_red … blue
+    (radiance), environment (its name), environment_sha256 (of its pixels), environment_rotation (about Z, rad).
     """
     import pandas as pd
 
@@ -232,6 +244,7 @@ def frame_table(records: Iterable[Mapping[str, Any]], recipe: Recipe) -> pd.Data
             "denoise_change": frame.get("denoise_change"),  # rooms of older versions have none
             "seconds": frame["seconds"],
             "seed": frame["seed"],
+            "processor": frame.get("processor", ""),  # rooms of older versions have none
             **({} if recipe.lighting == "own" else lightings.columns_of(frame.get("lighting"))),
         }
         for record in records
@@ -265,6 +278,7 @@ COLUMNS = {
     "denoise_change": "float64",
     "seconds": "float64",
     "seed": "int64",
+    "processor": "str",
 }
 
 

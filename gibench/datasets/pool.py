@@ -292,7 +292,9 @@ def end_with_parent() -> None:
     os._exit(1)
 
 
-def explained(problem: Exception, room: int | None, named: Callable[[int], str] = "room {}".format) -> str:
+def explained(
+    problem: BaseException, room: int | None, named: Callable[[int], str] = "room {}".format
+) -> str:
     """A failure in one line, with the room that it happened in."""
     place = "" if room is None else f"{named(room)}: "
     if isinstance(problem, GibenchError):

@@ -12,6 +12,9 @@ Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 RoomNumber = Annotated[str, Field(pattern=r"^[0-9]{1,9}$")]
 
+#: Characters of the name of a processor, at most.
+PROCESSOR = 100
+
 #: A file of a room from its folder. Whether it leads out of there is the gate's to say.
 FileName = Annotated[str, Field(min_length=1, max_length=1000)]
 
@@ -44,6 +47,7 @@ class Totals(Checked):
     median_error: Amount | None
     splits: dict[str, Count]
     denoise_changes: list[DenoiseChange] = Field(default_factory=list)
+    processors: dict[str, Count] = Field(default_factory=dict)
 
 
 class Manifest(Checked):
@@ -108,6 +112,7 @@ class FrameRecord(Checked):
     kernel_seconds: Amount
     denoise_seconds: Amount
     seconds: Amount
+    processor: Annotated[str, Field(max_length=PROCESSOR)] = ""
     seed: Count
     lighting: Annotated[AreaLightRecord | EnvironmentRecord, Field(discriminator="kind")] | None = None
 

@@ -6,14 +6,13 @@ import errno
 import hashlib
 import importlib.metadata
 import math
-import os
 import platform
 import shutil
 import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -22,10 +21,11 @@ import numpy as np
 import gibench
 from gibench.datasets import exr, unfinished
 from gibench.datasets.errors import RecipeError, StorageError
-from gibench.datasets.files import as_json, sync_tree
+from gibench.datasets.files import as_json, process_number, sync_tree
 from gibench.datasets.folder import RECORD, partial_folder, room_folder
 from gibench.datasets.lightings import keep_panorama
 from gibench.datasets.recipes import ENVIRONMENTS, Recipe
+from gibench.datasets.records import PROCESSOR
 from gibench.datasets.splits import split_of
 from gibench.generators.parts import Room
 from gibench.generators.scene_files import lighting_record
@@ -255,7 +255,7 @@ class RoomMaker:
         from gibench.generators.rooms import RejectedRoom
 
         final = room_folder(self.root, room)
-        partial = partial_folder(self.root, room, os.getpid())
+        partial = partial_folder(self.root, room, process_number())
         partial.mkdir(parents=True)
         try:
             record = self._filled(partial, room, report)
@@ -365,6 +365,7 @@ class RoomMaker:
             "kernel_seconds": rendered.kernel_seconds,
             "denoise_seconds": rendered.denoise_seconds,
             "denoise_change": rendered.denoise_change,
+            "processor": processor(),
             "seconds": rendered.seconds,
         }
         unfinished.write_down(folder, record)
@@ -402,14 +403,24 @@ def machine() -> dict[str, Any]:
 
     return {
         "platform": platform.platform(),
-        "cpu": _processor(),
+        "cpu": _cpu(),
         "cores": psutil.cpu_count(logical=True),
         "memory": psutil.virtual_memory().total,
         "python": platform.python_version(),
     }
 
 
-def _processor() -> str:
+def processor() -> str:
+    """Name of what renders in this process: of the GPU where the variant is CUDA's, else of the CPU."""
+    from gibench.rendering import backend
+
+    variant = backend.current_variant()
+    name = (backend.find_gpu() if variant.startswith("cuda") else None) or _cpu()
+    return " ".join(name.split())[:PROCESSOR]
+
+
+@cache
+def _cpu() -> str:
     information = Path("/proc/cpuinfo")
     if information.is_file():
         for line in information.read_text(encoding="utf-8", errors="replace").splitlines():

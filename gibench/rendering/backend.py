@@ -180,12 +180,11 @@ def select_variant(name: str = "auto") -> str:
     """
     if name != "auto" and name not in VARIANTS:
         raise BackendError(f"unknown variant {name!r}: choose auto, {', '.join(VARIANTS)}")
-    loaded = sys.modules.get("mitsuba")
-    current = loaded.variant() if loaded is not None else None
+    current = current_variant()
     if current in VARIANTS and name in ("auto", current):
-        if str(current).startswith("llvm"):
+        if current.startswith("llvm"):
             _refuse_old_llvm()
-        return str(current)
+        return current
 
     reasons: list[str] = []
     for variant in VARIANTS if name == "auto" else (name,):
@@ -196,6 +195,12 @@ def select_variant(name: str = "auto") -> str:
             return variant
         reasons.append(f"{variant}: {reason}")
     raise BackendError("; ".join(reasons) + " (`gibench doctor` shows what was found)")
+
+
+def current_variant() -> str:
+    """The variant that is set; empty where none is."""
+    loaded = sys.modules.get("mitsuba")
+    return "" if loaded is None else str(loaded.variant() or "")
 
 
 def is_scalar() -> bool:

@@ -123,7 +123,11 @@ BakeCache(Path(sys.argv[1]), "a scene", {}).get("probes", {"number": sys.argv[2]
 
 
 def test_what_killed_makings_leave_goes_at_the_next_start_and_living_ones_go_on(tmp_path):
-    (tmp_path / "slow.py").write_text(SLOW.replace("{sys.argv[2]}", "{__import__('os').getpid()}"))
+    (tmp_path / "slow.py").write_text(
+        SLOW.replace(
+            "{sys.argv[2]}", "{__import__('gibench.datasets.files').datasets.files.process_number()}"
+        )
+    )
     root = tmp_path / "bakes"
     processes = [
         subprocess.Popen(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+import signal
 import sys
 import time
 
@@ -119,10 +120,30 @@ class Wrong:
         return Prediction(colour)
 
 
+class Deadly:
+    """Kills the process that watches it, the first time or every time."""
+
+    def __init__(self, settings):
+        self.how = settings["how"]
+
+    def prepare(self, site):
+        mark = site.bakes.root.parent / "killed"
+        if self.how == "always" or not mark.exists():
+            mark.parent.mkdir(parents=True, exist_ok=True)
+            with mark.open("a") as tries:
+                tries.write("x")
+            os.kill(os.getppid(), signal.SIGKILL)
+            time.sleep(600)
+
+    def render(self, view, stages):
+        return Prediction(image(view, 0.5))
+
+
 HOWS = ("crash", "segfault", "exit", "nan", "negative", "infinite", "shape", "integers", "none")
 WRONG = found(
     "Wrong", knobs=(Knob("how", "well", ("well", *HOWS, "hang", "disk", "unprepared"), "what goes wrong"),)
 )
+DEADLY = found("Deadly", knobs=(Knob("how", "once", ("once", "always"), "when", bakes=True),))
 CONSTANT = found("Constant", knobs=(SHADE, STYLE, PAUSE), channels=("color",), budget="shade")
 PLAIN = found("Plain", knobs=(SHADE,))
 

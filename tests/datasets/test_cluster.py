@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import os
 import signal
-import subprocess
 import sys
 import threading
 import time
@@ -17,16 +15,16 @@ import pytest
 
 from gibench.cli import run
 from gibench.cli.app import make_app
-from gibench.datasets import cluster, folder, open_dataset, pool
+from gibench.datasets import cluster, cluster_opening, cluster_workers, folder, open_dataset, pool
+from gibench.datasets.cluster_opening import refuse_other
 from gibench.datasets.errors import ClusterError, FolderError, Interrupted, MakingError
 from gibench.datasets.making import make
 from gibench.datasets.pool import Report
 from gibench.datasets.room_making import RoomMaker
+from tests.clusters import dask, killed, scheduler
 from tests.datasets.fakes import Broken, Killed, Setup, fake_work, tiny
 
 pytest.importorskip("distributed")
-
-ENVIRONMENT = {**os.environ, "PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path)}
 
 
 def frames_of(root: Path) -> dict[str, str]:
@@ -43,56 +41,6 @@ def made_locally(root: Path, rooms: int) -> dict[str, str]:
 
 def left_behind(root: Path) -> list[str]:
     return [p.name for p in [*root.iterdir(), *(root / "rooms").iterdir()] if p.name.startswith(".")]
-
-
-def dask(*words: str) -> subprocess.Popen[bytes]:
-    """A process of Dask as a person or a batch system starts it."""
-    return subprocess.Popen(
-        [sys.executable, "-m", "dask", *words],
-        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=ENVIRONMENT, start_new_session=True,
-    )  # fmt: skip
-
-
-def scheduler(file: Path, port: int = 0) -> subprocess.Popen[bytes]:
-    file.unlink(missing_ok=True)
-    process = dask(
-        "scheduler",
-        "--scheduler-file",
-        str(file),
-        "--host",
-        "127.0.0.1",
-        "--port",
-        str(port),
-        "--no-dashboard",
-    )
-    wait_until(file.exists)
-    return process
-
-
-def wait_until(condition, seconds: float = 120) -> None:
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, "nothing happened"
-        time.sleep(0.05)
-
-
-def killed(*processes: subprocess.Popen[bytes]) -> None:
-    for process in processes:
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
-
-
-@pytest.fixture(scope="module")
-def workplace(tmp_path_factory):
-    """A scheduler's file, and two workers that were started by hand, as batch jobs are."""
-    file = tmp_path_factory.mktemp("dask") / "scheduler.json"
-    processes = [scheduler(file)]
-    for name in ("one", "two"):
-        words = ["--nthreads", "1", "--name", name, "--no-dashboard", "--death-timeout", "300"]
-        processes.append(dask("worker", "--scheduler-file", str(file), *words))
-    yield file
-    killed(*processes)
 
 
 def test_a_cluster_of_this_machine_and_a_local_run_make_the_same_and_go_on_for_each_other(tmp_path):
@@ -163,7 +111,7 @@ class Stopped:
 
 
 def test_a_worker_that_hangs_is_given_up_and_its_room_made_by_another(tmp_path, monkeypatch):
-    monkeypatch.setattr(cluster, "SILENCE", 20.0)  # a busy machine is silent too
+    monkeypatch.setattr(cluster_opening, "SILENCE", 20.0)  # a busy machine is silent too
     root = tmp_path / "d"
     make(root, tiny(4), cluster="local:2", work=pool.Work(Setup(), Stopped(RoomMaker(root, tiny(4)), 1)))
     assert (tmp_path / "stopped").exists()
@@ -245,17 +193,17 @@ def test_clusters_that_cannot_be_used(workplace, tmp_path, monkeypatch, capsys):
     for wrong in ("local:0", "local:", "local:x", "local:٣", f"local:{10**20}"):
         assert "write local:N with N from 1 to" in refused(["--cluster", wrong])
     assert "there is no scheduler file" in refused(["--cluster", str(tmp_path / "none.json")])
-    monkeypatch.setattr(cluster, "PATIENCE", 1.0)
+    monkeypatch.setattr(cluster_opening, "PATIENCE", 1.0)
     assert "nobody answers at tcp://127.0.0.1:9" in refused(["--cluster", "tcp://127.0.0.1:9"])
     lonely = scheduler(tmp_path / "lonely.json")
     try:
         assert "has no workers: start some with" in refused(["--cluster", str(tmp_path / "lonely.json")])
     finally:
         killed(lonely)
-    monkeypatch.setattr(cluster, "PATIENCE", 60.0)
+    monkeypatch.setattr(cluster_opening, "PATIENCE", 60.0)
 
-    here = cluster._versions()
-    monkeypatch.setattr(cluster, "_versions", lambda: {**here, "mitsuba": "1.2.3"})
+    here = cluster_workers.versions()
+    monkeypatch.setattr(cluster_workers, "versions", lambda: {**here, "mitsuba": "1.2.3"})
     said = refused(["--cluster", str(workplace)])
     assert "would make other pixels (mitsuba: " in said
     assert "1.2.3 here" in said
@@ -265,12 +213,12 @@ def test_clusters_that_cannot_be_used(workplace, tmp_path, monkeypatch, capsys):
 
 
 def test_workers_that_do_not_see_the_folder_are_named():
-    here = cluster._versions()
+    here = cluster_workers.versions()
     answer = {"sees": False, "versions": here, "host": "node7"}
-    with pytest.raises(ClusterError, match=r"worker tcp://a:1 on node7 does not see the folder"):
-        cluster._refuse_other("tcp://a:1", answer, here)
+    with pytest.raises(ClusterError, match=r"worker tcp://a:1 on node7 does not see the folder /d: "):
+        refuse_other("tcp://a:1", answer, here, Path("/d"))
     with pytest.raises(ClusterError, match=r"worker tcp://a:1 cannot be used: No module named 'gibench'"):
-        cluster._refuse_other("tcp://a:1", ModuleNotFoundError("No module named 'gibench'"), here)
+        refuse_other("tcp://a:1", ModuleNotFoundError("No module named 'gibench'"), here, Path("/d"))
     with pytest.raises(ClusterError, match=r"gibench: None there"):
-        cluster._refuse_other("tcp://a:1", {"sees": True, "versions": {}, "host": ""}, here)
-    cluster._refuse_other("tcp://a:1", {"sees": True, "versions": here, "host": ""}, here)
+        refuse_other("tcp://a:1", {"sees": True, "versions": {}, "host": ""}, here, Path("/d"))
+    refuse_other("tcp://a:1", {"sees": True, "versions": here, "host": ""}, here, Path("/d"))

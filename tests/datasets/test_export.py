@@ -1,6 +1,9 @@
 """Each format is opened by what its users open it with, and a point of the scene is found in its pictures."""
 
 import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Literal
 
@@ -141,6 +144,38 @@ def test_the_same_shards_every_time(rooms, tmp_path):
     first, again = (export(open_dataset(rooms), "webdataset", tmp_path / name) for name in ("a", "b"))
     for shard in first.iterdir():
         assert shard.read_bytes() == (again / shard.name).read_bytes()
+
+
+READER = """
+import sys, fsspec, webdataset
+from webdataset.gopen import gopen_schemes
+gopen_schemes["local"] = lambda url, mode="rb", *_, **__: fsspec.open(url, mode).open()
+store, path = fsspec.url_to_fs(sys.argv[1])
+urls = [f"local://{name}" for name in sorted(store.glob(f"{path}/*.tar"))]
+frames = webdataset.WebDataset(urls, nodesplitter=webdataset.split_by_node, shardshuffle=False).decode()
+print(*(frame["__key__"] for frame in frames))
+"""
+
+
+def test_hosts_share_shards_out_among_them(rooms, tmp_path, monkeypatch):
+    pytest.importorskip("webdataset")
+    pytest.importorskip("fsspec")
+    from gibench.datasets.export import web_shards
+
+    monkeypatch.setattr(web_shards, "SHARD_BYTES", 1)  # a frame a shard
+    shards = export(open_dataset(rooms), "webdataset", tmp_path / "shards", channels=["color"])
+    hosts = [
+        subprocess.Popen(
+            [sys.executable, "-c", READER, f"file://{shards}"],
+            env={**os.environ, "RANK": str(rank), "WORLD_SIZE": "2"},
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        for rank in range(2)
+    ]
+    first, second = (set(host.communicate(timeout=300)[0].split()) for host in hosts)
+    assert len(first) == len(second) == 2
+    assert first | second == {f"{frame.room:06d}_{frame.view:04d}" for frame in open_dataset(rooms)}
 
 
 def test_hypersim_like_hdf5(rooms, tmp_path_factory):

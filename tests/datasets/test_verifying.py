@@ -8,7 +8,11 @@ import OpenEXR
 import pandas as pd
 import pytest
 
+from gibench.cli import run
+from gibench.cli.app import app
+from gibench.datasets import open_dataset, room_making
 from gibench.datasets.exr import encode, layer_names, stored_types
+from gibench.datasets.manifest import gathered, read_manifest, write_manifest, write_table
 from gibench.datasets.verifying import frame_faults, verify
 from gibench.rendering.channels import CHANNELS
 from tests.datasets.fakes import pixels, tiny
@@ -122,3 +126,40 @@ def test_a_sum_that_another_program_rounded_differently_is_found(tmp_path):
 
     said = list(frame_faults(decode(tmp_path / "f.exr"), tiny(channels=tuple(stored))))
     assert said == ["color is not the sum of its five parts in 192 pixels"]
+
+
+def test_rooms_of_several_processors_are_told(copy, capsys):
+    here = open_dataset(copy).frames["processor"]
+    assert here.nunique() == 1
+    assert here[0] == room_making.processor() != ""
+    assert "processors" not in told(copy, capsys)
+
+    for room, name in (
+        (0, "Other CPU 9000"),
+        (1, None),
+    ):  # another machine's room, and one of an older version
+        path = copy / f"rooms/{room:06d}/frames.json"
+        record = json.loads(path.read_text())
+        for frame in record["frames"]:
+            frame["processor"] = name
+            if name is None:
+                del frame["processor"]
+        path.write_text(json.dumps(record))
+    manifest, table = gathered(copy, read_manifest(copy))
+    write_manifest(copy, manifest)
+    write_table(copy, table)
+    frames = open_dataset(copy).frames
+    assert set(frames.loc[frames["room"] == 0, "processor"]) == {"Other CPU 9000"}
+    assert verify(copy) == []
+    said = told(copy, capsys)
+    assert said.count("processors") == 2
+    assert "3 kinds (" in said
+    assert "Other CPU 9000 2" in said
+    assert "unknown 2 frames" in said
+
+
+def told(root, capsys) -> str:
+    """What `info` and `verify` say."""
+    assert run(app, ["dataset", "info", str(root)]) == 0
+    assert run(app, ["dataset", "verify", str(root)]) == 0
+    return " ".join(capsys.readouterr().out.split())

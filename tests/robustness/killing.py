@@ -33,8 +33,10 @@ from pathlib import Path
 from gibench.datasets.making import make
 from tests.datasets.fakes import fake_work, tiny
 if __name__ == "__main__":
-    root, recipe = Path(sys.argv[1]), tiny(4)
-    make(root, recipe, workers=2, command="again", work=fake_work(root, recipe, slow=0.05))
+    root, recipe, how = Path(sys.argv[2]), tiny(4), {"workers": 2}
+    if sys.argv[1] == "cluster":
+        recipe, how = tiny(20), {"cluster": "local:2"}
+    make(root, recipe, command="again", work=fake_work(root, recipe, slow=0.05), **how)
 """
 GIBENCH = (sys.executable, "-m", "gibench")
 TINY = ("--views", "2", "--resolution", "32x24", "--spp", "4", "--channels", "radiance,surface")
@@ -78,6 +80,9 @@ crop = 32
 """
 
 
+WHOM = ("command", "worker", "group")
+
+
 @dataclass(frozen=True)
 class Command:
     """words: without the folder, which comes last. whole: files that are never changed once they are there, with what
@@ -108,11 +113,18 @@ def _results(root: Path) -> dict[str, str | None]:
 
 
 COMMANDS = {
-    "make-fake": Command((sys.executable, "-c", FAKE), _frames),
+    "make-fake": Command((sys.executable, "-c", FAKE, "workers"), _frames),
+    "make-fake-cluster": Command((sys.executable, "-c", FAKE, "cluster"), _frames),
     "make-dataset": Command(
         (*GIBENCH, "dataset", "make", "--rooms", "3", "--workers", "2", *TINY, "--out"), _frames
     ),
     "bench": Command((*GIBENCH, *BENCH, "lightmap", "--out"), _results, ("scenes", "run.json")),
+    "make-cluster": Command(
+        (*GIBENCH, "dataset", "make", "--rooms", "3", "--cluster", "local:2", *TINY, "--out"), _frames
+    ),
+    "bench-cluster": Command(
+        (*GIBENCH, *BENCH, "lightmap", "--cluster", "local:2", "--out"), _results, ("scenes", "run.json")
+    ),
     "training": Command((*GIBENCH, *BENCH, "elp", "--out"), _results, ("scenes", "run.json")),
 }
 
@@ -148,9 +160,9 @@ def completed(command: Command, root: Path) -> float:
     return time.monotonic() - began
 
 
-def kill(process: subprocess.Popen[str], rng: random.Random) -> str:
+def kill(process: subprocess.Popen[str], rng: random.Random, whom: tuple[str, ...] = WHOM) -> str:
     """Kill a command, one of its workers or the group; returns which, empty where it had ended."""
-    who = rng.choice(("command", "worker", "group"))
+    who = rng.choice(whom)
     if process.poll() is not None:
         return ""
     if who == "group":
@@ -172,6 +184,7 @@ def killed(
     seed: int,
     seconds: float = float("inf"),
     told: Callable[[str], None] = lambda line: None,
+    whom: tuple[str, ...] = WHOM,
 ) -> Outcome:
     """Kill a command again and again; see the module. seconds: after which no further kill begins. told: of each."""
     command, rng = COMMANDS[name], random.Random(f"{name}-{seed}")
@@ -200,7 +213,7 @@ def killed(
             delay = rng.uniform(0, 1.1 * (shortened if given else duration))
             with contextlib.suppress(subprocess.TimeoutExpired):
                 process.communicate(timeout=delay)
-            who = kill(process, rng)
+            who = kill(process, rng, whom)
             # Without its command everything must end: a worker that starts, when it is there. Without a worker, or with
             # nothing to kill, it goes on.
             process.communicate(timeout=300 if who in ("command", "group") else 1200)
@@ -268,6 +281,7 @@ def main() -> None:
     """Kill as the command line says; end with code 1 where anything was lost."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--command", action="append", choices=list(COMMANDS))
+    parser.add_argument("--whom", action="append", choices=WHOM, help="all unless it is said")
     parser.add_argument("--kills", type=int, default=50)
     parser.add_argument("--seed", type=int, default=random.SystemRandom().randrange(2**32))
     parser.add_argument("--seconds", type=float, default=float("inf"))
@@ -283,7 +297,7 @@ def main() -> None:
                 with asked.log.open("a", encoding="utf-8") as log:
                     print(line, file=log)
 
-        outcome = killed(name, asked.kills, asked.seed, asked.seconds, told)
+        outcome = killed(name, asked.kills, asked.seed, asked.seconds, told, tuple(asked.whom or WHOM))
         told(f"{outcome.kills} kills, seed {asked.seed}, {len(outcome.lost)} losses")
         lost += len(outcome.lost)
     sys.exit(1 if lost else 0)

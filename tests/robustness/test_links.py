@@ -16,7 +16,7 @@ from gibench.cli import run as command
 from gibench.cli.app import app
 from gibench.datasets import folder as folders
 from gibench.datasets.errors import FolderError
-from gibench.datasets.files import as_json, write_whole
+from gibench.datasets.files import as_json, process_number, write_whole
 
 
 def tree(root: Path) -> dict[str, bytes | str]:
@@ -121,7 +121,7 @@ def test_only_own_leftovers_go(ds):
 
 def test_a_file_is_not_written_through_a_link_left_under_its_passing_name(tmp_path):
     (tmp_path / "mine").write_text("mine")
-    (tmp_path / f".x.json.partial-{os.getpid()}").symlink_to(tmp_path / "mine")
+    (tmp_path / f".x.json.partial-{process_number()}").symlink_to(tmp_path / "mine")
     with pytest.raises(OSError, match="symbolic links"):
         write_whole(tmp_path / "x.json", b"{}")
     assert (tmp_path / "mine").read_text() == "mine"

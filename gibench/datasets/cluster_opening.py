@@ -1,0 +1,113 @@
+"""Finding a cluster: one of this machine, or the scheduler that somebody has started."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from gibench.datasets.cluster_workers import DECIDING
+from gibench.datasets.errors import ClusterError
+from gibench.datasets.pool import MOST_WORKERS
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+#: Seconds that a scheduler and its first worker may take to answer, and a scheduler that was lost to come back.
+PATIENCE = 60.0
+
+#: Workers that a task may take with it: the third time it is set aside.
+DEATHS = 3
+
+#: Seconds without a sign of life after which a worker of a local cluster is given up.
+SILENCE = 60.0
+
+
+@contextlib.contextmanager
+def opened(cluster: str, tasks: int = MOST_WORKERS) -> Iterator[str]:
+    """The address or file of a scheduler; "local:N" starts one with N workers, at most as many as there are tasks.
+
+    What was started ends with the context. Raises ClusterError: no Dask, no such file, no such number.
+    """
+    dask, distributed = _libraries()
+    name, _, number = cluster.partition(":")
+    if name == "local":
+        if not (number.isascii() and number.isdigit() and 1 <= int(number) <= MOST_WORKERS):
+            raise ClusterError(
+                f"--cluster: '{cluster}' is not allowed; write local:N with N from 1 to {MOST_WORKERS}"
+            )
+        settings = {
+            "distributed.scheduler.allowed-failures": DEATHS - 1,
+            "distributed.scheduler.worker-ttl": f"{SILENCE:.0f} s",
+            "distributed.comm.timeouts.connect": f"{PATIENCE:.0f} s",
+        }
+        with (
+            dask.config.set(settings),
+            distributed.LocalCluster(
+                n_workers=min(int(number), max(tasks, 1)),
+                threads_per_worker=max(1, (os.cpu_count() or 1) // int(number)),
+                processes=True,
+                dashboard_address=":0",
+                silence_logs=logging.CRITICAL,
+            ) as there,
+        ):
+            yield there.scheduler_address
+        return
+    if cluster.endswith(".json") and not Path(cluster).is_file():
+        raise ClusterError(f"--cluster: there is no scheduler file {cluster}: `dask scheduler` writes one")
+    yield cluster
+
+
+@contextlib.contextmanager
+def connected(cluster: str, *, lost: bool = False) -> Iterator[Client]:
+    """A client of the scheduler at an address, or of a scheduler's file. lost: whether it was there before."""
+    _, distributed = _libraries()
+    place = {"scheduler_file": cluster} if cluster.endswith(".json") else {"address": cluster}
+    try:
+        client = distributed.Client(**place, timeout=PATIENCE, set_as_default=False)
+    except (OSError, ValueError, TimeoutError) as problem:
+        if lost:
+            raise ClusterError(
+                f"the scheduler at {cluster} is gone: start it again, then run the same command again to continue"
+            ) from None
+        raise ClusterError(
+            f"--cluster: nobody answers at {cluster} ({' '.join(str(problem).split())[:200]}): start a scheduler "
+            "with `dask scheduler`, or write local:N"
+        ) from None
+    try:
+        yield client
+    finally:
+        client.close(timeout=2)
+
+
+def _libraries() -> tuple[Any, Any]:
+    try:
+        import dask
+        import distributed
+    except ImportError:
+        raise ClusterError("--cluster needs Dask: pip install 'gibench[cluster]'") from None
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    return dask, distributed
+
+
+def refuse_other(address: str, answer: Any, here: dict[str, str], folder: Path) -> None:
+    """Raise ClusterError for a worker that cannot be used. answer: of `examined`; here: versions of this process."""
+    if not isinstance(answer, dict):
+        reason = " ".join(str(answer).split()) or "no answer"
+        raise ClusterError(
+            f"worker {address} cannot be used: {reason}; it needs this gibench: pip install gibench"
+        )
+    if not answer["sees"]:
+        raise ClusterError(
+            f"worker {address} on {answer['host']} does not see the folder {folder}: every worker needs it under the "
+            "same path, on a disk that all share"
+        )
+    there = answer["versions"]
+    if differing := [name for name in DECIDING if there.get(name) != here.get(name)]:
+        listed = "; ".join(f"{n}: {there.get(n)} there, {here.get(n)} here" for n in differing)
+        raise ClusterError(
+            f"worker {address} on {answer['host']} would make other pixels ({listed}): pip install the same"
+        )
