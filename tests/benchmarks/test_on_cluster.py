@@ -117,7 +117,7 @@ def test_ctrl_c_ends_the_processes_of_the_workers(workplace, scenes_only):
 
     overrides = {"constant": {"pause": (0.1,)}, "wrong": {"how": ("hang",)}}
     asked = order(toys.CONSTANT, toys.WRONG, overrides=overrides, cluster=str(workplace))
-    with pytest.raises(Interrupted, match="stopped with 1 of 2 results there; to continue run"):
+    with pytest.raises(Interrupted, match="stopped with 1 of 3 results there; to continue run"):
         run(scenes_only, asked, on_state=stop)
     end = time.monotonic() + 60
     while measuring := [p for p in psutil.process_iter(["cmdline"]) if _is_of(p, scenes_only)]:
