@@ -17,7 +17,7 @@ from gibench.benchmarks.orders import Order, ordered_methods
 from gibench.benchmarks.registry import Found
 from gibench.benchmarks.result_files import RunFolder
 from gibench.benchmarks.running import run
-from gibench.cli import bench_telling
+from gibench.cli import bench_printing
 from gibench.datasets.errors import ClusterError, FolderError, MakingError
 from tests.benchmarks import toys
 from tests.benchmarks.conftest import order
@@ -46,8 +46,8 @@ def test_two_workers_and_a_local_run_make_the_same_and_go_on_for_each_other(
 ):
     local, _ = made
     asked = order(toys.CONSTANT, toys.PLAIN, overrides=OVERRIDES)
-    teller = bench_telling.Teller()
-    report = run(scenes_only, replace(asked, cluster=str(workplace)), on_state=teller.tell)
+    teller = bench_printing.RunPrinter()
+    report = run(scenes_only, replace(asked, cluster=str(workplace)), on_state=teller.show)
     assert (report.made, report.failed, report.workers) == (6, (), 2)
     assert files_of(RunFolder(scenes_only)) == files_of(RunFolder(local))
     assert left_behind(scenes_only) == []
@@ -57,7 +57,7 @@ def test_two_workers_and_a_local_run_make_the_same_and_go_on_for_each_other(
     assert len({record["frames"][0]["extra"]["process"] for record in records}) == 4
     entry = RunFolder(scenes_only).read_run()["runs"][-1]
     assert (entry["workers"], entry["made"], entry["ended"]) == (2, 6, True)
-    bench_telling.tell_run(scenes_only, report)
+    bench_printing.print_run(scenes_only, report)
     assert "summed over 2 workers" in " ".join(capsys.readouterr().out.split())
 
     assert run(scenes_only, asked).made == 0
