@@ -81,10 +81,10 @@ class IndirectLight(Learner):
         optimisers = {"network": torch.optim.Adam(network.parameters(), lr=RATE)}
         if plan.adversarial:
             with seeded(plan.seed):
-                judge = PatchGan(LIGHT + 1).to(device)
-            networks["judge"] = judge
+                discriminator = PatchGan(LIGHT + 1).to(device)
+            networks["judge"] = discriminator
             optimisers["judge"] = torch.optim.Adam(
-                judge.parameters(), lr=JUDGE_RATE, betas=(JUDGE_BETA, 0.999)
+                discriminator.parameters(), lr=JUDGE_RATE, betas=(JUDGE_BETA, 0.999)
             )
         self.features = Vgg16Features().to(device) if plan.perceptual else None
         super().__init__(networks, optimisers, product=["network"])
@@ -127,16 +127,16 @@ class IndirectLight(Learner):
             shown = _shown(batch, inputs.radiance_of(light))
             losses["perceptual"] = self.features(*(window.of(image) for image in shown))
             loss = loss + LOOKED_EVERY * PERCEPTUAL * losses["perceptual"]
-        judge = self.networks.get("judge")
-        if judge is not None and window is not None:
+        discriminator = self.networks.get("judge")
+        if discriminator is not None and window is not None:
             # A colour at a time, whatever the network does.
             given = window.of(inputs.light).transpose(1, 2).flatten(0, 1)
             ours, theirs = (window.of(image).flatten(0, 1)[:, None] for image in (made, true))
-            losses["adversarial"] = fooling(judge(given, ours))
+            losses["adversarial"] = fooling(discriminator(given, ours))
             loss = loss + LOOKED_EVERY * ADVERSARIAL * losses["adversarial"]
         self.descend("network", loss, largest_gradient=LARGEST_GRADIENT)
-        if judge is not None and window is not None:
-            losses["judge"] = judging(judge(given, theirs), judge(given, ours.detach()))
+        if discriminator is not None and window is not None:
+            losses["judge"] = judging(discriminator(given, theirs), discriminator(given, ours.detach()))
             self.descend("judge", losses["judge"])
         return {"loss": loss, **losses}
 
