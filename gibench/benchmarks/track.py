@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
+from gibench import gate
 from gibench.baselines.method import Method
 from gibench.benchmarks.errors import TrackError
 from gibench.datasets.checked import Name
@@ -203,18 +204,17 @@ def load_track(name: str) -> Track:
     if name.endswith(".toml"):
         path = Path(name)
         try:
-            text = path.read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as problem:
-            reason = problem.strerror if isinstance(problem, OSError) else "it is no text"
-            raise TrackError(f"track {path} cannot be read: {reason}") from None
+            content = gate.read_regular(path)
+        except gate.GateError as problem:
+            raise TrackError(f"track {problem}") from None
     elif name in track_names():
-        text = (resources.files("gibench.benchmarks") / "tracks" / f"{name}.toml").read_text("utf-8")
+        content = (resources.files("gibench.benchmarks") / "tracks" / f"{name}.toml").read_bytes()
     else:
         raise TrackError(
             f"no track '{name}'; {nearest(name, track_names())}, or give the path of a .toml file"
         )
     try:
-        values = toml_values(text.encode())
+        values = toml_values(content)
     except ValueError as problem:
         raise TrackError(f"track {name} is no valid TOML: {problem}") from None
     return check_track(values, source=f"track {name}")

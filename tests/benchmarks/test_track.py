@@ -1,5 +1,6 @@
 import copy
 import math
+import os
 from collections import Counter
 
 import pytest
@@ -96,6 +97,9 @@ def test_unknown_tracks_presets_and_files(tmp_path):
         load_track("walkthrough").preset("cpus")
     with pytest.raises(TrackError, match=r"none\.toml cannot be read: No such file"):
         load_track(str(tmp_path / "none.toml"))
+    os.mkfifo(tmp_path / "pipe.toml")
+    with pytest.raises(TrackError, match=r"pipe\.toml is no regular file"):
+        load_track(str(tmp_path / "pipe.toml"))
     (tmp_path / "bad.toml").write_text("id = ")
     with pytest.raises(TrackError, match=r"bad\.toml is no valid TOML"):
         load_track(str(tmp_path / "bad.toml"))

@@ -271,10 +271,10 @@ def test_a_mask_counts():
 ELSEWHERE = {
     "bench-disk-full-fails-results": ("benchmarks/test_running.py", "disk"),
     "bench-kill-leaves-bakes": ("baselines/test_bakes.py", "kill"),
-    "sigterm-leaves-no-table": ("datasets/test_making.py", "SIGTERM"),
+    "sigterm-leaves-no-table": ("cli/test_stopping.py", "SIGTERM"),
     "worker-stopped-no-word": ("datasets/test_making.py", "SIGSTOP"),
-    "hdrflip-dust": ("metrics/test_hdrflip.py", "dust"),
-    "no-home": ("cli", "HOME"),
+    "hdrflip-dust": ("metrics/test_strange_inputs.py", "dust"),
+    "no-home": ("metrics/test_lpips_weights.py", "HOME"),
     "denoised_highlight": ("rendering/test_denoise.py", "highlight"),
     "scale_texture": ("generators/imported/test_upgrading.py", "scaled_textures"),
 }
