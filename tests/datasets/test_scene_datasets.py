@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 
 import numpy as np
 import pytest
@@ -230,3 +231,26 @@ def test_a_scene_that_mitsuba_refuses_is_a_mistake_of_its_author(tmp_path, capsy
     assert "scene.xml:3: the bsdf diffuse has no property nobody: remove it" in " ".join(
         capsys.readouterr().err.split()
     )
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs links and pipes")
+def test_licences_that_lead_elsewhere_are_not_copied(tmp_path, capsys):
+    scene, secret = tmp_path / "scene", tmp_path / "secret"
+    file = written(scene, '<sensor type="perspective"/><shape type="cube"/><emitter type="constant"/>')
+    secret.mkdir()
+    (secret / "id").write_text("a key")
+    (scene / "terms.txt").write_text("CC-BY")
+    (scene / "LICENSE").symlink_to("../secret/id")
+    (scene / "LICENSE.all").symlink_to("../secret")
+    (scene / "LICENSE.gone").symlink_to("nowhere")
+    (scene / "LICENCE.md").symlink_to("terms.txt")  # stays in the folder
+    os.mkfifo(scene / "LICENSE.pipe")
+    assert run(app, ["convert", str(file), "--out", str(tmp_path / "new")]) == 0
+    said = capsys.readouterr()
+    for name in ("LICENSE", "LICENSE.pipe", "LICENSE.gone"):
+        assert f"{name} beside the scene is no file of its folder, and was not copied" in said.out + said.err
+    copied = {path.name: path for path in (tmp_path / "new").glob("LICEN*")}
+    assert set(copied) == {"LICENCE.md"}
+    assert not copied["LICENCE.md"].is_symlink()
+    assert copied["LICENCE.md"].read_text() == "CC-BY"
+    assert not any(b"a key" in path.read_bytes() for path in (tmp_path / "new").rglob("*") if path.is_file())
