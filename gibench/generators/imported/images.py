@@ -7,6 +7,7 @@ own.
 from __future__ import annotations
 
 import io
+import re
 import tempfile
 from pathlib import Path
 
@@ -27,6 +28,10 @@ BANDS = {"r": 0, "g": 1, "b": 2, "a": 3}
 MOST_PIXELS = 1 << 28
 """Of one image; a file of a hundred bytes can ask for more."""
 
+LONGEST_HEADER = 1 << 16
+
+RADIANCE, FLOAT_MAPS = (b"#?",), (b"PF", b"Pf")
+
 EXR, EXR_NAMES = b"\x76\x2f\x31\x01", ("R", "G", "B", "A", "Y", "X", "Z", "RY", "BY")
 
 
@@ -39,9 +44,11 @@ def check_images(tree: SceneTree) -> None:
         if not isinstance(file.source, Path):
             continue
         with file.source.open("rb") as opened:
-            start = opened.read(4)
-        if start == EXR:
+            start = opened.read(LONGEST_HEADER)
+        if start.startswith(EXR):
             _check_exr(file.owner.where, file.source)
+        elif start.startswith((*RADIANCE, *FLOAT_MAPS)):
+            _check_float_image(file.owner.where, file.source, start)
         else:
             _check_image(file.owner.where, file.source)
         if file.owner.type == "envmap":
@@ -66,6 +73,19 @@ def _check_exr(where: str, path: Path) -> None:
         )
 
 
+def _check_float_image(where: str, path: Path, start: bytes) -> None:
+    """Of a Radiance HDR or a portable float map, whose pixels nothing but their headers announce."""
+    if start.startswith(RADIANCE):
+        found = re.search(rb"\n\s*\n[+-][XY] (\d{1,9}) [+-][XY] (\d{1,9})\s", start)
+        height, width = (int(found[1]), int(found[2])) if found is not None else (0, 0)
+    else:
+        found = re.match(rb"P[Ff]\s+(\d{1,9})\s+(\d{1,9})\s", start)
+        width, height = (int(found[1]), int(found[2])) if found is not None else (0, 0)
+    if width < 1 or height < 1:
+        raise SceneFileError(f"{where}: {path.name} is a damaged image, which states no size: get it again")
+    _check_size(where, path, width, height)
+
+
 def _check_image(where: str, path: Path) -> None:
     try:
         with Image.open(path) as image:
@@ -75,7 +95,7 @@ def _check_image(where: str, path: Path) -> None:
             f"{where}: {path.name} has more than {MOST_PIXELS} pixels: make it smaller"
         ) from None
     except (OSError, ValueError, SyntaxError):
-        return  # Radiance HDR, float maps: Mitsuba reads them, and has its say
+        return  # Mitsuba has its say
     _check_size(where, path, *size)
     if mode in ("CMYK", "YCCK", "LAB"):
         raise SceneFileError(f"{where}: {path.name} is a {kind} of {mode} colours: save it as RGB")
@@ -114,7 +134,7 @@ def linear(path: Path, *, raw: bool = False) -> NDArray[np.float32] | None:
         if raw:
             bitmap.set_srgb_gamma(False)
         bitmap = bitmap.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False)
-    except (RuntimeError, UnicodeDecodeError):
+    except (RuntimeError, UnicodeDecodeError, MemoryError):
         return None
     return np.array(bitmap)
 

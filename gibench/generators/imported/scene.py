@@ -20,6 +20,7 @@ from gibench.generators.imported.distance_grids import mesh_grids
 from gibench.generators.imported.errors import SceneFileError
 from gibench.generators.imported.files import destinations, named_files, settle_missing
 from gibench.generators.imported.films import DEFAULT_SIZE, film_of, whole_number
+from gibench.generators.imported.finite import check_numbers
 from gibench.generators.imported.images import check_images, made_images, plain_roughness
 from gibench.generators.imported.mesh_files import check_meshes
 from gibench.generators.imported.obj_files import split_objs
@@ -159,6 +160,7 @@ def import_scene(file: Path, settings: ImportSettings | None = None) -> Imported
 
         return take
 
+    check_numbers(tree.root)
     resolve_aliases(tree.root, note("aliases"))
     check_references(tree.root)
     share_emitters(tree.root, note("shared_lights"))
