@@ -10,7 +10,7 @@ from pathlib import Path
 from gibench.generators.imported.changes import Note
 from gibench.generators.imported.errors import SceneFileError
 from gibench.generators.imported.reading import SceneTree
-from gibench.generators.imported.tree import Node, new, parents_of, replaced
+from gibench.generators.imported.tree import Node, new, parents_of, replaced, wrapped
 
 SIGNATURES = (
     b"\x89PNG",
@@ -186,9 +186,7 @@ def _without_texture(root: Node, texture: Node, parents: dict[int, Node]) -> Non
 def _unwrap(wrapper: Node, inner: Node, parents: dict[int, Node]) -> None:
     """Put the material of a wrapper in its place, under its names."""
     if inner.tag == "ref" or inner.get("id"):
-        # Both have names of their own: a mask of opacity one changes nothing, and can stand for the wrapper.
-        wrapper.set("type", "mask")
-        wrapper[:] = [new("float", wrapper, name="opacity", value="1"), inner]
+        wrapped(wrapper, inner)  # both have names of their own
         return
     outer = parents[id(wrapper)]
     inner.attrib.pop("name", None)

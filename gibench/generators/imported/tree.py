@@ -54,6 +54,20 @@ def copied(node: Node) -> Node:
     return copy
 
 
+def wrapped(node: Node, inner: Node) -> None:
+    """Make a material one that is as another, under its own id and name.
+
+    It is a blend of the other with itself: a mask of opacity one would be transparent to Mitsuba, and could not stand
+    in a `twosided`.
+    """
+    again = new("ref", inner, id=inner.get("id", "")) if inner.get("id") else copied(inner)
+    for part in again.everything():
+        if part.tag != "ref":
+            part.attrib.pop("id", None)
+    node.set("type", "blendbsdf")
+    node[:] = [new("float", node, name="weight", value="0"), inner, again]
+
+
 def parents_of(root: Node) -> dict[int, Node]:
     """The parent of each element, by the id() of the element."""
     return {id(child): node for node in root.everything() for child in node}

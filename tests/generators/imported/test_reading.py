@@ -131,8 +131,8 @@ def test_an_unknown_plugin_is_named_with_its_place_and_the_nearest(tmp_path):
         SceneFileError, match=r"scene\.xml:3: there is no bsdf 'diffus': did you mean diffuse"
     ):
         upgraded(tmp_path, '\n<bsdf type="diffus"/>')
-    with pytest.raises(SceneFileError, match=r"scene\.xml:2: there is no shape 'heightfield'"):
-        upgraded(tmp_path, '<shape type="heightfield"/>')
+    with pytest.raises(SceneFileError, match=r"scene\.xml:2: there is no shape 'deformable'"):
+        upgraded(tmp_path, '<shape type="deformable"/>')
     with pytest.raises(SceneFileError, match=r"scene\.xml:2: <bsdf> has no type"):
         upgraded(tmp_path, "<bsdf/>")
 

@@ -681,3 +681,22 @@ def test_woven_cloth_has_the_mean_colour_of_its_yarns(tmp_path):
     assert "woven_cloth" in rules_of(changes)
     np.testing.assert_allclose(numbers(one(root, "rgb").get("value")), (0.1, 0.2, 0.3))
     assert one(root, "bsdf").type == "diffuse"
+
+
+@pytest.mark.parametrize("metal", ["roughconductor", "twosided"])
+@pytest.mark.parametrize("outer", ["{}", '<bsdf type="twosided">{}</bsdf>'])
+def test_a_coat_over_what_stands_elsewhere(tmp_path, metal, outer):
+    """Coats of two sides of two sides are what exporters of Mitsuba 0.5 wrote."""
+    inside = "" if metal == "roughconductor" else '<bsdf type="roughconductor"/>'
+    coat = outer.format('<bsdf type="coating"><ref id="metal"/></bsdf>')
+    root, changes = upgraded(
+        tmp_path, f'<bsdf type="{metal}" id="metal">{inside}</bsdf>{shape_of(coat)}<emitter type="constant"/>'
+    )
+    assert "coatings" in rules_of(changes)
+    loads(root)
+
+
+def test_a_mixture_of_one_may_have_two_sides(tmp_path):
+    one_part = '<bsdf type="mixturebsdf"><string name="weights" value="1"/><bsdf type="plastic"/></bsdf>'
+    root, _ = upgraded(tmp_path, shape_of(f'<bsdf type="twosided">{one_part}</bsdf>'))
+    loads(root)

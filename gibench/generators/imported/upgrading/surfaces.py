@@ -7,7 +7,7 @@ import re
 
 from gibench.generators.imported.changes import Note
 from gibench.generators.imported.errors import SceneFileError
-from gibench.generators.imported.tree import Node, new
+from gibench.generators.imported.tree import Node, copied, new, parents_of, wrapped
 from gibench.generators.imported.upgrading.rules import (
     become,
     constant_color,
@@ -111,8 +111,14 @@ def rough_diffuse(root: Node, note: Note) -> None:
 
 def coatings(root: Node, note: Note) -> None:
     """A coat over a diffuse surface becomes (rough) plastic; over anything else it is left out."""
+    by_id = {node.get("id"): node for node in root.everything() if node.tag == "bsdf" and node.get("id")}
     for node in reversed(plugins(root, "bsdf", "coating", "roughcoating")):  # a coat inside of another first
         inner = next(iter(node.nodes("bsdf", "ref")), None)
+        if inner is not None and inner.tag == "ref" and inner.get("id") in by_id:
+            inner = copied(by_id[inner.get("id", "")])
+            for part in inner.everything():
+                if part.tag != "ref":
+                    part.attrib.pop("id", None)
         if inner is None:
             raise SceneFileError(f"{node.where}: {node.type} coats nothing: put a <bsdf> inside")
         old = node.type
@@ -136,12 +142,16 @@ def coatings(root: Node, note: Note) -> None:
             )
             note(node, f"{old} over diffuse is {node.type}", loss=True)
         elif inner.tag == "ref":
-            # Something that stands for what it points at; nothing in Mitsuba 3 does only that.
-            become(node, "mask", setting(node, "float", "opacity", 1), inner)
+            wrapped(node, inner)
             note(node, f"{old} is left out, what it coats stays", loss=True)
         else:
-            children = list(inner)
-            become(node, inner.type, *[c for c in children if isinstance(c, Node)])
+            parent = parents_of(root).get(id(node))
+            if inner.type == "twosided" and parent is not None and parent.type == "twosided":
+                inner = inner.nodes("bsdf", "ref")[0] if inner.nodes("bsdf", "ref") else inner
+            if inner.tag == "ref":
+                wrapped(node, inner)
+            else:
+                become(node, inner.type, *inner.nodes())
             note(node, f"{old} is left out, what it coats stays", loss=True)
 
 
@@ -165,7 +175,7 @@ def mixtures(root: Node, note: Note) -> None:
             ]
             blended = outer
         if len(parts) == 1:
-            become(node, "mask", setting(node, "float", "opacity", 1), blended)
+            wrapped(node, blended)
         else:
             become(node, "blendbsdf", *[c for c in blended if isinstance(c, Node)])
         note(node, f"mixturebsdf of {len(parts)} is blendbsdf", loss=abs(total - 1) > 1e-3)
