@@ -14,6 +14,7 @@ reach of one that lies on a wall. With a = b = 0 it is a convolution.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import pairwise
 
 import torch
@@ -32,6 +33,9 @@ SLOPE = 0.1
 FIRST = 1.0
 """a and b before they are learned."""
 
+LEAST = 1e-6
+"""Weight of a tap below which it is left out."""
+
 SIDE = 3
 """Taps along a side of a kernel."""
 
@@ -45,12 +49,9 @@ class Surfaces:
         position, normal, depth = geometry.split((3, 3, 1), dim=1)
         size = depth.square().clamp(min=1e-6)
         self.differences = []
-        for row, column in _taps():
-            there = (_shifted(part, row, column, "replicate") for part in (normal, position))
-            n, x = (
-                (one - other).square().sum(1, keepdim=True)
-                for one, other in zip((normal, position), there, strict=True)
-            )
+        both = torch.cat([normal, position], dim=1)
+        for there in _taps(both, "replicate"):
+            n, x = (part.sum(1, keepdim=True) for part in (both - there).square().split(3, dim=1))
             self.differences.append((n, x / size))
 
     def halved(self) -> Surfaces:
@@ -74,12 +75,13 @@ class BilateralConvolution(nn.Module):
         """(N, inputs, H, W) to (N, outputs, H, W)."""
         a, b = softplus(self.strictness)
         weights = torch.cat([torch.exp(-a * n - b * x) for n, x in surfaces.differences], dim=1)
+        # Denormals take a hundred times as long.
+        weights = torch.where(weights > LEAST, weights, 0)
         weights = weights / weights.mean(dim=1, keepdim=True)
-        kernel = self.convolution.weight
+        kernels = self.convolution.weight.flatten(2).unbind(-1)
         total = self.convolution.bias[:, None, None]  # type: ignore[index]
-        for number, (row, column) in enumerate(_taps()):
-            tap = kernel[:, :, row + SIDE // 2, column + SIDE // 2][..., None, None]
-            total = total + conv2d(_shifted(features, row, column) * weights[:, number : number + 1], tap)
+        for kernel, weight, there in zip(kernels, weights.split(1, dim=1), _taps(features), strict=True):
+            total = total + conv2d(there * weight, kernel[..., None, None])
         return total
 
 
@@ -99,7 +101,7 @@ class BilateralNetwork(nn.Module):
             for below, skip in zip(channels[:0:-1], channels[-2::-1], strict=True)
         )
         self.last = nn.Conv2d(channels[0], 3, 1)
-        nn.init.xavier_uniform_(self.last.weight)
+        nn.init.xavier_uniform_(self.last.weight, 0.1)  # untrained: about as much indirect light as direct
         nn.init.zeros_(self.last.bias)  # type: ignore[arg-type]
 
     @property
@@ -131,14 +133,10 @@ class BilateralNetwork(nn.Module):
         return code[..., :height, :width]
 
 
-def _taps() -> list[tuple[int, int]]:
-    reach = range(-(SIDE // 2), SIDE // 2 + 1)
-    return [(row, column) for row in reach for column in reach]
-
-
-def _shifted(image: Tensor, row: int, column: int, beyond: str = "constant") -> Tensor:
-    """The pixel that lies so many rows below and columns to the right of each. beyond: mode of `pad`; 0 by default."""
-    reach = SIDE // 2
+def _taps(image: Tensor, beyond: str = "constant") -> Iterator[Tensor]:
+    """What lies at each tap of a kernel, row by row, for all pixels. beyond: mode of `pad`; 0 unless it is given."""
     height, width = image.shape[-2:]
-    wide = pad(image, (reach,) * 4, mode=beyond)
-    return wide[..., reach + row : reach + row + height, reach + column : reach + column + width]
+    wide = pad(image, (SIDE // 2,) * 4, mode=beyond)
+    for row in range(SIDE):
+        for column in range(SIDE):
+            yield wide[..., row : row + height, column : column + width]

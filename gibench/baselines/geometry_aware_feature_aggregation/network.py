@@ -168,6 +168,8 @@ class GeometryAware(nn.Module):
         self.aggregation = Aggregation(light[-1], size.heads)
         self.last = nn.Conv2d(light[0], size.colours, 3, padding=1)
         _xavier(self.last)
+        with torch.no_grad():  # untrained, it says about as much indirect light as there is direct
+            self.last.weight *= 0.1
 
     @property
     def multiple(self) -> int:

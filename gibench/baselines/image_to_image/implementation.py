@@ -9,7 +9,7 @@ from torch import nn
 
 from gibench.baselines.direct_light.tracer import DirectLight
 from gibench.baselines.image_to_image.camera_space import in_camera_space
-from gibench.baselines.image_to_image.device_frames import DeviceFrames, channels_first, torch_device
+from gibench.baselines.image_to_image.device_frames import DeviceFrames, channels_first
 from gibench.baselines.image_to_image.examples import READ, Examples
 from gibench.baselines.image_to_image.frames import Frames, held_out
 from gibench.baselines.image_to_image.learner import EPOCHS, IndirectLight, Plan
@@ -23,6 +23,7 @@ from gibench.baselines.training.checkpoints import Checkpoint
 from gibench.baselines.training.errors import CheckpointError
 from gibench.baselines.training.loop import train
 from gibench.baselines.training.reproducible import seeded
+from gibench.rendering.backend import torch_device
 
 HELD_OUT, MOST_HELD_OUT = 0.05, 8
 """Share of the training rooms that a network does not learn from, and how many of their frames are looked at."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import torch
@@ -74,7 +73,10 @@ class IndirectLight(Learner):
 
     def __init__(self, network: nn.Module, learned: Examples, held_out: Examples, plan: Plan) -> None:
         """network: on its device."""
-        self.learned, self.held_out, self.plan = learned, held_out, plan
+        self.learned, self.plan = learned, plan
+        # Read once, and before any clock says what a look takes.
+        examples = [inputs_of(held_out[index]) for index in range(len(held_out))]
+        self.held_out = [{name: image[None] for name, image in example.items()} for example in examples]
         self.network = network
         device = next(network.parameters()).device
         networks = {"network": network}
@@ -94,16 +96,10 @@ class IndirectLight(Learner):
         plan = self.plan
         return batches(self.learned, plan.batch, plan.seed, draw=Draw(plan.crop), processes=processes)
 
-    @cached_property
-    def _judged(self) -> list[Images]:
-        """The frames that are held out, each as a batch, read once."""
-        examples = (inputs_of(self.held_out[index]) for index in range(len(self.held_out)))
-        return [{name: image[None] for name, image in example.items()} for example in examples]
-
     def error(self) -> Tensor:
         """Mean absolute difference of display values of diffuse light, direct and indirect, of whole frames."""
         errors = []
-        for example in self._judged:
+        for example in self.held_out:
             batch = _on(example, self.device)
             inputs = Inputs.of(batch["direct"], batch["albedo"], batch["geometry"])
             made = inputs.radiance(self.network(inputs.light, inputs.geometry))
@@ -116,7 +112,10 @@ class IndirectLight(Learner):
         set_rate(self.optimisers["network"], RATE * half_cosine(now.progress))
         inputs = Inputs.of(batch["direct"], batch["albedo"], batch["geometry"], batch["unit"])
         light = OUTPUT.decode(self.network(inputs.light, inputs.geometry))
-        truth = demodulated(batch["truth"], inputs.albedo) / inputs.unit
+        # Where no direct light is in view nothing can be learned: what comes out is black.
+        lit = inputs.unit > 0
+        truth = demodulated(batch["truth"], inputs.albedo) / torch.where(lit, inputs.unit, 1)
+        truth = torch.where(lit, truth, light.detach())
         made, true = torch.log1p(light), torch.log1p(truth)
         content = smooth_absolute(made, true)
         losses = {"content": content}

@@ -43,9 +43,8 @@ def remodulated(light: Tensor, albedo: Tensor) -> Tensor:
 
 
 def brightness(direct: Tensor) -> Tensor:
-    """(…, 1, 1, 1): mean of direct light over albedo (…, 3, H, W), all colours together; 1 where there is none."""
-    mean = direct.mean(dim=(-3, -2, -1), keepdim=True)
-    return torch.where(mean > 0, mean, 1)
+    """(…, 1, 1, 1): mean of direct light over albedo (…, 3, H, W), all colours together."""
+    return direct.mean(dim=(-3, -2, -1), keepdim=True)
 
 
 def geometry(images: Images) -> Tensor:
@@ -61,7 +60,8 @@ def geometry(images: Images) -> Tensor:
 class Inputs:
     """What a network is given of frames. light: (N, LIGHT, 3, H, W), compressed direct light over albedo, and albedo.
 
-    geometry: (N, GEOMETRY, H, W). unit: (N, 1, 1, 1), of the light. albedo: (N, 3, H, W).
+    geometry: (N, GEOMETRY, H, W). unit: (N, 1, 1, 1), of the light: 0 where no direct light is in view, and then what
+    comes out is black, for light is linear. albedo: (N, 3, H, W).
     """
 
     light: Tensor
@@ -74,7 +74,8 @@ class Inputs:
         """direct: direct diffuse radiance (N, 3, H, W), ≥ 0. unit: `brightness` unless it is given."""
         light = demodulated(direct, albedo)
         unit = brightness(light) if unit is None else unit
-        return Inputs(torch.stack([torch.log1p(light / unit), albedo], dim=1), geometry, unit, albedo)
+        light = torch.log1p(light / torch.where(unit > 0, unit, 1))
+        return Inputs(torch.stack([light, albedo], dim=1), geometry, unit, albedo)
 
     def radiance(self, code: Tensor) -> Tensor:
         """What a network says, (N, 3, H, W), as indirect diffuse radiance: finite and ≥ 0."""

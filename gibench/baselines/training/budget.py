@@ -10,6 +10,9 @@ from gibench.baselines.training.errors import TrainingError
 LOOKS = 50
 """Looks at the held-out error, unless the budget says how many steps apart they are."""
 
+LOOKING = 0.2
+"""Share of the seconds that looks may take, where the budget does not say how many steps apart they are."""
+
 PLANNED_AFTER = 0.02
 """Share of the seconds after which the number of steps is planned, where it is not given."""
 
@@ -44,10 +47,16 @@ class Budget:
         if self.seconds is not None and not (math.isfinite(self.seconds) and self.seconds > 0):
             raise TrainingError(f"budget: seconds must be above 0, not {self.seconds!r}")
 
+    def looks(self, a_look: float) -> int:
+        """How many there are, where no number of steps is between them. a_look: seconds of one."""
+        if self.seconds is None or self.seconds * LOOKING >= LOOKS * a_look:
+            return LOOKS
+        return max(1, int(self.seconds * LOOKING / a_look))
+
     def planned(self, made: int, spent: float, a_step: float, a_look: float) -> int:
         """Steps that the seconds allow. made: already, in `spent` seconds. a_step, a_look: seconds of one."""
         assert self.seconds is not None
-        looks = LOOKS * a_look
+        looks = self.looks(a_look) * a_look
         if self.look_every is not None:  # each step then has its share of a look
             looks, a_step = 0.0, a_step + a_look / self.look_every
         return made + max(1, int((self.seconds - spent - looks) / max(a_step, 1e-9)))

@@ -78,7 +78,7 @@ class _Run:
         self.device = learner.device
         self.owner: dict[str, Any] = {"seed": seed, **machine(self.device)}
         self.owner |= {f"budget {name}": value for name, value in asdict(budget).items() if value is not None}
-        self.step, self.planned = 0, budget.steps
+        self.step, self.planned, self.looks = 0, budget.steps, LOOKS
         self.seconds = self.before = self.waited = 0.0
         self.curve: list[Look] = []
         self.best: Look
@@ -142,6 +142,7 @@ class _Run:
             if spent >= PLANNED_AFTER * self.budget.seconds:
                 a_step = self.warm_seconds / (self.made - WARM)
                 self.planned = self.budget.planned(self.step, spent, a_step, self.a_look)
+                self.looks = self.budget.looks(self.a_look)
 
     def _settle(self, write: Write) -> None:
         """Work after a step: losses are read, the held-out error is looked at, the state is kept, or all ends."""
@@ -172,7 +173,7 @@ class _Run:
         return None
 
     def _look_is_due(self) -> bool:
-        every = self.budget.look_every or (math.ceil(self.planned / LOOKS) if self.planned else None)
+        every = self.budget.look_every or (math.ceil(self.planned / self.looks) if self.planned else None)
         return every is not None and self.step % every == 0
 
     def _look(self) -> None:
@@ -270,5 +271,5 @@ class _Run:
             raise CheckpointError(unreadable(self.checkpoint.path, problem)) from problem
 
 
-_NUMBERS = ("step", "planned", "seconds", "waited", "ended", "a_look")
+_NUMBERS = ("step", "planned", "looks", "seconds", "waited", "ended", "a_look")
 """Attributes of a run that a checkpoint keeps."""

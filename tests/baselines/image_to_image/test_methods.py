@@ -140,6 +140,7 @@ def test_hard_frames_stay_finite(name):
             found = indirect(net, *frame(direct=direct, albedo=albedo))
             assert torch.isfinite(found).all()
             assert (found >= 0).all()
+            assert found.any() == (direct > 0)
     for size in ((1, 1), (8, 8), (33, 70)):
         assert indirect(net, *frame(*size)).shape == (1, 3, *size)
 
@@ -181,6 +182,15 @@ def test_from_the_file_to_radiance_colours_and_exposure_are_what_they_are(views,
     together = network("gfa:normal")
     swapped = radiance(together, turned)
     assert not torch.allclose(swapped, radiance(together, example)[[2, 0, 1]], rtol=1e-2)
+
+
+def test_frames_without_direct_light_teach_nothing(views):
+    frames = Examples(Frames(views, READ))
+    learner = IndirectLight(network("bcn"), frames, frames, Plan(32, 1, False, False, 0))
+    batch = next(iter(learner.batches()(0)))
+    batch = {**batch, "direct": 0 * batch["direct"], "unit": 0 * batch["unit"]}
+    losses = learner.step(batch, Step(0, 0.0, np.random.default_rng(0)))
+    assert losses["content"] == 0
 
 
 def test_what_a_step_sees(views):

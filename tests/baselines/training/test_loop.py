@@ -242,6 +242,14 @@ def test_where_only_seconds_are_given_the_steps_are_planned_and_can_be_repeated(
     assert learner.seen[planned_at:] == [n / trained.planned for n in range(planned_at, trained.steps)]
 
 
+def test_looks_that_take_long_are_few(clock):
+    """A fifth of the seconds is theirs at most, and the steps have the rest."""
+    trained = train(slow(Fit(), 0.01, 0.2, clock), points(), Budget(seconds=5.0), seed=0)
+    assert trained.planned == pytest.approx((5.0 - 5 * 0.2 - 0.2) / 0.01, abs=12)
+    assert len(trained.curve) <= 1 + 5 + 1
+    assert trained.seconds == pytest.approx(5.0, abs=0.25)
+
+
 def test_planned_steps_that_take_longer_than_they_did_end_with_the_seconds(clock):
     learner = slow(Fit(), 0.01, 0.0, clock)
     quick = learner.step
