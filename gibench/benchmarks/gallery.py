@@ -36,10 +36,18 @@ TITLES = {
 def recipes(*, rooms: int, spp: int) -> dict[str, Recipe]:
     """The datasets of a gallery, by name. rooms: of the first picture. spp: samples a pixel, then denoised."""
     common: dict[str, Any] = {"spp": spp, "resolution": [192, 144], "channels": ["color"], "rooms": 1}
+    light = {"light": {"views": 6, "path": "walk", "moves": "light"}}
     overrides: dict[str, dict[str, Any]] = {
         "rooms": {"rooms": rooms, "views": 1},
-        "channels": {"views": 2, "path": "walk", "lighting": "area-light", "channels": list(SETS)},
-        "moving-light": {"views": 6, "path": "walk", "path_moves": "light", "lighting": "area-light"},
+        # Parts are noisier than their sum, and all of them are shown.
+        "channels": {
+            "views": 2,
+            "path": "walk",
+            "spp": 4 * spp,
+            "channels": list(SETS),
+            "lighting": "area-light",
+        },
+        "moving-light": {"views": 0, "sequences": light, "lighting": "area-light"},
         "environments": {"rooms": 2, "views": 3, "kinds": ["still-life"], "lighting": "environments"},
     }
     return {name: load_preset("small", common | more) for name, more in overrides.items()}
@@ -81,7 +89,7 @@ def make_gallery(
 
 def _picture(name: str, dataset: Dataset) -> Image.Image:
     if name == "channels":
-        return frame_panel(dataset[len(dataset) - 1])
+        return frame_panel(dataset[len(dataset) - 1])  # the first has none before it to move from
     first = dataset[0]["color"]
     exposure = float(reference_exposure(first)) if name == "moving-light" else None
     tiles = []
@@ -100,7 +108,8 @@ def _methods(results: Results) -> Image.Image:
     shown: set[str] = set()
     for record in sorted(records, key=lambda record: str(record["label"])):
         method = str(record["config"]["method"])
-        if record["config"]["scene"] == scene and method not in shown:
+        ablation = ":" in method
+        if record["config"]["scene"] == scene and method not in shown and not ablation:
             shown.add(method)
             image = image_of(tone_map(results.prediction(record["id"], 0), exposure))
             tiles.append((image, method, f"{1000 * record['frames'][0]['seconds']:.0f} ms"))

@@ -13,7 +13,8 @@ def test_every_picture_has_a_recipe_and_a_title():
     assert list(found) == list(gallery.TITLES)
     assert (found["rooms"].rooms, found["rooms"].views) == (20, 1)
     assert {"motion", "curvature", "radiance_cue_3", "reflected_normal"} <= set(found["channels"].channels)
-    assert found["moving-light"].path_moves == "light"
+    assert found["moving-light"].sequences["light"].moves == "light"
+    assert found["channels"].spp == 4 * found["rooms"].spp
     assert found["environments"].lighting == "environments"
 
 
