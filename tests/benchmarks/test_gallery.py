@@ -12,7 +12,7 @@ def test_every_picture_has_a_recipe_and_a_title():
     found = gallery.recipes(rooms=20, spp=4)
     assert list(found) == list(gallery.TITLES)
     assert (found["rooms"].rooms, found["rooms"].views) == (20, 1)
-    assert {"motion", "curvature", "radiance_cue_3", "reflected_normal"} <= set(found["channels"].channels)
+    assert {"motion", "curvature", "indirect_specular", "reflected_normal"} <= set(found["channels"].channels)
     assert found["moving-light"].sequences["light"].moves == "light"
     assert found["channels"].spp == 4 * found["rooms"].spp
     assert found["environments"].lighting == "environments"
