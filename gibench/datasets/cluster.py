@@ -107,6 +107,7 @@ class _Tasks:
         self.readying: dict[str, Future] = {}
         self.waiting: dict[int, Future] = {}
         self.places: dict[int, set[str]] = {}
+        self.last_seen = time.monotonic()
         self.all_are_able = True
 
     def prepare(self) -> None:
@@ -200,6 +201,13 @@ class _Tasks:
     def _able(self, left: deque[int]) -> list[str]:
         """Addresses of the workers that may do tasks. Raises OSError or TimeoutError where the scheduler is gone."""
         there = self._workers()
+        if there:
+            self.last_seen = time.monotonic()
+        elif time.monotonic() - self.last_seen > opening.ABANDONED:
+            raise ClusterError(
+                f"no worker has been there for {opening.ABANDONED:.0f} s: start some, then run the same command again "
+                "to continue"
+            )
         if self.accepts is None:
             return there
         self._ready(address for address in there if address not in {*self.facts, *self.readying})

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 #: Seconds that a scheduler and its first worker may take to answer, and a scheduler that was lost to come back.
 PATIENCE = 60.0
 
+#: Seconds without any worker after which a run ends: those that were there have given up, or their jobs have ended.
+ABANDONED = 600.0
+
 #: Workers that a task may take with it: the third time it is set aside.
 DEATHS = 3
 

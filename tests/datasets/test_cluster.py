@@ -140,6 +140,32 @@ def test_a_scheduler_that_is_killed_and_started_again(tmp_path):
         killed(first, worker, *replaced)
 
 
+def test_a_run_whose_workers_are_all_gone_ends(tmp_path, monkeypatch):
+    monkeypatch.setattr(cluster_opening, "ABANDONED", 2.0)
+    file, root = tmp_path / "scheduler.json", tmp_path / "d"
+    processes = [
+        scheduler(file),
+        dask("worker", "--scheduler-file", str(file), "--nthreads", "1", "--no-nanny"),
+    ]
+
+    def kill_worker(progress) -> None:
+        if progress.rooms_done == 1:
+            killed(processes[1])
+
+    try:
+        with pytest.raises(ClusterError, match="no worker has been there for 2 s: start some"):
+            make(
+                root,
+                tiny(4),
+                cluster=str(file),
+                work=fake_work(root, tiny(4), slow=0.05),
+                on_progress=kill_worker,
+            )
+        assert folder.whole_rooms(root)
+    finally:
+        killed(*processes)
+
+
 def test_ctrl_c_stops_rooms_that_are_being_made_and_keeps_those_that_are_whole(workplace, tmp_path):
     root = tmp_path / "d"
 
