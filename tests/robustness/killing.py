@@ -215,10 +215,11 @@ def killed(
             with contextlib.suppress(subprocess.TimeoutExpired):
                 process.communicate(timeout=delay)
             who = kill(process, rng, whom)
-            if not who and given:  # machines are not equally busy all the time
-                shortened = min(shortened, time.monotonic() - began)
-            elif not who:
-                duration = min(duration, time.monotonic() - began)
+            if not who and not in_a_row:  # all of it: machines are not equally busy all the time
+                if given:
+                    shortened = min(shortened, time.monotonic() - began)
+                else:
+                    duration = min(duration, time.monotonic() - began)
             # Without its command everything must end: a worker that starts, when it is there. Without a worker, or with
             # nothing to kill, it goes on.
             process.communicate(timeout=300 if who in ("command", "group") else 1200)

@@ -74,7 +74,10 @@ def _heights(tree: SceneTree, node: Node) -> tuple[NDArray[np.float64], str]:
 
 
 def height_mesh(heights: NDArray[np.float64], *, smooth: bool) -> Mesh:
-    """A mesh over [-1, 1]² of heights (H, W) along z, row 0 at y = -1; it faces +z. smooth: with vertex normals."""
+    """A mesh over [-1, 1]² of heights (H, W) along z, row 0 at y = -1; it faces +z, as in Mitsuba 0.6.
+
+    smooth: with vertex normals.
+    """
     rows, columns = heights.shape
     v, u = np.meshgrid(np.linspace(0, 1, rows), np.linspace(0, 1, columns), indexing="ij")
     vertices = np.stack([2 * u - 1, 2 * v - 1, heights], axis=-1).reshape(-1, 3)
