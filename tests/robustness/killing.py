@@ -172,8 +172,11 @@ def kill(process: subprocess.Popen[str], rng: random.Random, whom: tuple[str, ..
     else:
         with contextlib.suppress(psutil.Error):
             children = psutil.Process(process.pid).children(recursive=True)
-            if not children:
+            if not children and "command" not in whom:
                 return ""
+            if not children:  # none has been started yet
+                process.kill()
+                return "command"
             rng.choice(children).kill()
     return who
 
