@@ -1,1 +1,62 @@
 """Neural Global Illumination (Gao et al. 2022): indirect light of a room whose camera and area light move."""
+
+from __future__ import annotations
+
+from gibench.baselines.linearly_transformed_cosines import SHADOWS
+from gibench.baselines.method import Knob, Method, Variant
+
+METHOD = Method(
+    id="ngi",
+    title="Neural global illumination",
+    family="neural",
+    tracks=("moving-light",),
+    paper="Gao et al. 2022, Neural Global Illumination: Interactive Indirect Illumination Prediction under Dynamic "
+    "Area Lights",
+    implementation="gibench.baselines.neural_global_illumination.implementation:NeuralLight",
+    channels=(
+        "color",
+        "direct_diffuse",
+        "direct_specular",
+        "indirect_diffuse",
+        "indirect_specular",
+        "position",
+        "normal",
+        "albedo",
+        "specular_albedo",
+        "roughness",
+        "reflected_position",
+        "reflected_normal",
+        "reflected_albedo",
+        "radiance_cue_0",
+        "radiance_cue_1",
+        "radiance_cue_2",
+        "radiance_cue_3",
+    ),
+    knobs=(
+        Knob(
+            "network", "full", ("small", "full"), "1.24 or the paper's 14.65 million parameters", trains=True
+        ),
+        Knob("lpips", True, (False, True), "whether the perceptual loss is trained for", trains=True),
+        Knob("cnn", True, (False, True), "whether a U-Net looks at the screen", trains=True),
+        Knob("encoding", True, (False, True), "sines and cosines of the inputs", trains=True),
+        Knob(
+            "lighting",
+            "all",
+            ("position", "no-cues", "all"),
+            "the light by its centre, by its direction and direct light, or by radiance cues too",
+            trains=True,
+        ),
+        Knob("images", 1.0, (0.1, 0.2, 0.5, 1.0), "share of the training frames", trains=True),
+        Knob("crop", 64, (32, 64, 128, 256), "pixels along a side of what a step learns from", trains=True),
+        *SHADOWS,
+    ),
+    budget="shadow_rays",
+    trains=True,
+    variants=(
+        Variant("no-lpips", {"lpips": False}),
+        Variant("no-cues", {"lighting": "no-cues"}),
+        Variant("no-cnn", {"cnn": False}),
+        Variant("no-encoding", {"encoding": False}),
+        Variant("position-only", {"lighting": "position"}),
+    ),
+)

@@ -1,0 +1,200 @@
+"""How the network learns a room (Gao et al. 2022, section 3.5): by differences of codes, then by LPIPS of crops too."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from gibench.baselines.image_to_image.frames import Frames
+from gibench.baselines.method import Setting
+from gibench.baselines.neural_global_illumination.inputs import CODE, Measure, assembled, per_radiance
+from gibench.baselines.neural_global_illumination.network import FULL, SMALL, NeuralGlobalIllumination, Size
+from gibench.baselines.training.batches import batches
+from gibench.baselines.training.budget import Budget
+from gibench.baselines.training.checkpoints import Checkpoint
+from gibench.baselines.training.crops import random_window
+from gibench.baselines.training.curves import Trained
+from gibench.baselines.training.display import displayed
+from gibench.baselines.training.errors import TrainingError
+from gibench.baselines.training.learner import Learner, Step
+from gibench.baselines.training.loop import train
+from gibench.baselines.training.losses.perceptual import SMALLEST, Lpips
+from gibench.baselines.training.losses.pixels import absolute
+from gibench.baselines.training.reproducible import seeded
+from gibench.baselines.training.schedule import half_cosine, set_rate
+from gibench.datasets.lightings import lighting_of
+from gibench.rendering.lighting import AreaLight
+
+STEPS = 1_000_000
+"""Where no time is set (section 3.7.1)."""
+
+RATES = {"full": 1e-4, "small": 1e-3}
+"""Of Adam at the start, by network; it falls along half a cosine. The paper has 1e-4, and makes a hundred times the
+steps of a CPU."""
+
+BATCH = 2
+"""Crops a step; the paper has one image of 256 × 256."""
+
+LARGEST_GRADIENT = 1.0
+"""Norm that gradients are cut down to."""
+
+PERCEPTUAL = 1.0
+"""Weight of LPIPS, λ (section 3.5)."""
+
+PERCEPTUAL_FROM, PERCEPTUAL_EVERY, PERCEPTUAL_SIDE = 0.8, 4, 64
+"""Share of the training after which LPIPS is looked at, steps from one look to the next, each with as much more weight,
+and pixels along a side: VGG16 costs more than the small network, and the paper's order is not said."""
+
+KEPT = 1 << 30
+"""Bytes of examples that are kept in memory, in half precision, so that no frame is read and put together twice."""
+
+
+class Example(NamedTuple):
+    """A frame. inputs: (34, H, W). code: of indirect radiance, rest: all other light as it is shown, (3, H, W).
+
+    shown: (3, 1, 1), what a decoded unit of indirect radiance is as it is shown.
+    """
+
+    inputs: Tensor
+    code: Tensor
+    rest: Tensor
+    shown: Tensor
+
+
+class Examples:
+    """Frames of a room as examples, by number."""
+
+    def __init__(self, frames: Frames, measure: Measure, lighting: str) -> None:
+        """lighting: one of `inputs.LIGHTING`."""
+        self.frames, self.measure, self.lighting = frames, measure, lighting
+        self._kept: OrderedDict[int, Example] = OrderedDict()
+        self._bytes = 0
+
+    def __len__(self) -> int:
+        """How many."""
+        return len(self.frames)
+
+    def __getitem__(self, index: int) -> Example:
+        """Read one, or take it from memory."""
+        if index not in self._kept:
+            example = self._made(index)
+            halves = Example(*(part.half() for part in example[:3]), example.shown)
+            size = sum(part.numel() * part.element_size() for part in halves)
+            if self._bytes + size > KEPT:
+                return example
+            self._kept[index] = halves
+            self._bytes += size
+        return Example(*(part.float() for part in self._kept[index]))
+
+    def _made(self, index: int) -> Example:
+        images, area = self.frames[index], area_of(self.frames, index)
+        indirect = images["indirect_diffuse"] + images["indirect_specular"]
+        inputs = assembled(images, self.frames.camera(index), area, self.measure, self.lighting)
+        code = CODE.encode(per_radiance(indirect, area) / self.measure.indirect)
+        exposure = self.frames.exposure(index)
+        rest = ((images["color"] - indirect).clamp(min=0) * exposure).clamp(max=1)
+        shown = torch.tensor(area.radiance)[:, None, None] * (self.measure.indirect * exposure)
+        return Example(inputs, code, rest, shown)
+
+
+def area_of(frames: Frames, index: int) -> AreaLight:
+    """The light of a frame. Raises TrainingError where no area light lights it."""
+    row = {str(name): value for name, value in frames.rows.iloc[index].items()}
+    area = lighting_of(row, Path()).area
+    if area is None:
+        raise TrainingError(
+            f"training frame {row['file']} is not lit by an area light: make the dataset with --lighting area-light"
+        )
+    return area
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What decides a training, beside its frames. size: of the network. seconds: None for STEPS."""
+
+    network: str
+    size: Size
+    lpips: bool
+    crop: int
+    seed: int
+    seconds: float | None
+
+    @staticmethod
+    def of(settings: Mapping[str, Setting], seed: int, seconds: float | None) -> Plan:
+        """From the settings of the method."""
+        name = str(settings["network"])
+        return Plan(name, size_of(settings), bool(settings["lpips"]), int(settings["crop"]), seed, seconds)
+
+
+def size_of(settings: Mapping[str, Setting]) -> Size:
+    """Of the network."""
+    size = {"full": FULL, "small": SMALL}[str(settings["network"])]
+    if not settings["cnn"]:
+        size = replace(size, levels=())
+    return size if settings["encoding"] else replace(size, frequencies=0)
+
+
+class Predicting(Learner):
+    """The network of a room."""
+
+    def __init__(
+        self, examples: Examples, judged: Sequence[Example], plan: Plan, device: str = "cpu"
+    ) -> None:
+        """judged: what is held out. Raises WeightsError where LPIPS has none."""
+        self.examples, self.plan = examples, plan
+        with seeded(plan.seed):
+            self.network = NeuralGlobalIllumination(plan.size)
+        self.network.to(device)
+        self.held_out = [Example(*(part.to(device) for part in one)) for one in judged]
+        self.judge = Lpips().to(device) if plan.lpips else None
+        optimiser = torch.optim.Adam(self.network.parameters(), lr=RATES[plan.network])
+        super().__init__({"network": self.network}, {"network": optimiser})
+
+    def trained(self, checkpoint: Checkpoint | None) -> Trained:
+        """Train until the budget is spent."""
+        plan = self.plan
+        crops = batches(self.examples, BATCH, plan.seed, draw=self._crop)
+        budget = Budget(steps=None if plan.seconds else STEPS, seconds=plan.seconds)
+        return train(self, crops, budget, seed=plan.seed, checkpoint=checkpoint, title="ngi")
+
+    def _crop(self, example: Example, random: np.random.Generator) -> Example:
+        window = random_window(example.code.shape[-2:], self.plan.crop, random)
+        return Example(*(window.of(part) for part in example[:3]), example.shown)
+
+    def error(self) -> Tensor:
+        """Of what is held out: mean absolute difference of codes."""
+        errors = [absolute(self.network(one.inputs[None]), one.code[None]) for one in self.held_out]
+        return torch.stack(errors).mean()
+
+    def step(self, batch: Example, now: Step) -> dict[str, Tensor]:
+        """Down equation 5."""
+        set_rate(self.optimisers["network"], RATES[self.plan.network] * half_cosine(now.progress))
+        inputs, code, rest, shown = (part.to(self.device) for part in batch)
+        output = self.network(inputs)
+        losses = {"pixels": absolute(output, code)}
+        loss = losses["pixels"]
+        if self._looks(now, code):
+            window = random_window(code.shape[-2:], PERCEPTUAL_SIDE, now.random)
+            images = [displayed(window.of(CODE.decode(part) * shown + rest), 1.0) for part in (output, code)]
+            assert self.judge is not None
+            losses["lpips"] = self.judge(*images)
+            loss = loss + PERCEPTUAL_EVERY * PERCEPTUAL * losses["lpips"]
+        self.descend("network", loss, largest_gradient=LARGEST_GRADIENT)
+        return {name: value.detach() for name, value in losses.items()}
+
+    def _looks(self, now: Step, code: Tensor) -> bool:
+        """Whether this step has LPIPS in its loss."""
+        due = now.progress >= PERCEPTUAL_FROM and now.number % PERCEPTUAL_EVERY == 0
+        return self.judge is not None and due and min(code.shape[-2:]) >= SMALLEST
+
+
+def facts_of(kept: Mapping[str, Any]) -> Measure:
+    """The measure that is kept with weights. Raises KeyError, ValueError, TypeError."""
+    return Measure.of_facts({name: float(value) for name, value in kept.items()})
