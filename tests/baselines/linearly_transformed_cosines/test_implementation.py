@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 
-import mitsuba as mi
 import numpy as np
 import pytest
 
@@ -12,54 +11,18 @@ from gibench.baselines.linearly_transformed_cosines import METHOD
 from gibench.baselines.linearly_transformed_cosines.implementation import AnalyticLight, RectangleLight
 from gibench.baselines.method import MethodError, View
 from gibench.baselines.stages import Stages
-from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.channels import CUES
-from gibench.rendering.light_rig import LightRig
 from gibench.rendering.lighting import AreaLight, Lighting, Shot
 from gibench.rendering.render import render_frame
-from gibench.rendering.scene import load_dict
+from tests.baselines.material_strips import CAMERA, strips_rig
 from tests.baselines.sites import site
-from tests.rendering import scenes
 
 RESOLUTION = (40, 32)
-
-CAMERA = PinholeCamera((0.0, -2.4, 1.2), (0.0, 0.2, 0.3), np.radians(70.0))
-
-
-def coat(alpha):
-    return scenes.two_sided(
-        type="roughplastic", alpha=alpha, distribution="ggx", diffuse_reflectance=scenes.rgb(0.4, 0.2, 0.1)
-    )
-
-
-STRIPS = {
-    "matt": scenes.MATERIALS["diffuse"],
-    "coat": coat(0.05),
-    "rough coat": coat(0.4),
-    "metal": scenes.two_sided(type="roughconductor", material="Cu", alpha=0.15, distribution="ggx"),
-    "rough metal": scenes.two_sided(type="roughconductor", material="Al", alpha=0.5, distribution="ggx"),
-    "mirror": scenes.MATERIALS["mirror"],
-}
-"""Materials of the floor, from left to right: those that rooms have."""
 
 
 @pytest.fixture(scope="module")
 def rig():
-    width = 3.0 / len(STRIPS)
-    parts = {
-        name.replace(" ", "_"): scenes.rectangle(
-            [-1.5 + (k + 0.5) * width, 0, 0], [0, 0, 1], (width / 2, 1.5), bsdf=material
-        )
-        for k, (name, material) in enumerate(STRIPS.items())
-    }
-    wall = scenes.two_sided(type="diffuse", reflectance=scenes.rgb(0.6))
-    parts["wall"] = scenes.rectangle([0, 1.5, 1], [0, -1, 0], (1.5, 1), bsdf=wall)
-    parts["box"] = {
-        "type": "cube",
-        "to_world": mi.ScalarTransform4f().translate([0.2, 0.3, 0.25]).scale([0.5, 0.15, 0.25]),
-        "bsdf": wall,
-    }
-    return LightRig(load_dict({"type": "scene", **parts}), panoramas=False)
+    return strips_rig()
 
 
 @pytest.fixture(scope="module")
