@@ -85,7 +85,7 @@ class Examples:
         """Read one, or take it from memory."""
         if index not in self._kept:
             example = self._made(index)
-            halves = Example(*(part.half() for part in example[:3]), example.shown)
+            halves = Example(example.inputs.half(), example.code.half(), example.rest.half(), example.shown)
             size = sum(part.numel() * part.element_size() for part in halves)
             if self._bytes + size > KEPT:
                 return example
@@ -166,7 +166,8 @@ class Predicting(Learner):
 
     def _crop(self, example: Example, random: np.random.Generator) -> Example:
         window = random_window(example.code.shape[-2:], self.plan.crop, random)
-        return Example(*(window.of(part) for part in example[:3]), example.shown)
+        inputs, code, rest, shown = example
+        return Example(window.of(inputs), window.of(code), window.of(rest), shown)
 
     def error(self) -> Tensor:
         """Of what is held out: mean absolute difference of codes."""
