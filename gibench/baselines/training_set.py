@@ -79,14 +79,15 @@ class TrainingSet(Sequence[Frame]):
 
         An item is channel → float32 tensor (C, H, W), or int64 for ids. A frame is handed out, and charged for, when
         its item is read, by forked workers too; to workers that are spawned all of them are. frames: numbers of those
-        that it is over, in that order; all of them by default. Raises DatasetError where there are none.
+        that it is over, in that order; all of them by default. Items come out of the dataset's cache where that has
+        these channels; `read(index, window)` of the result reads a part of one. Raises DatasetError where there are no
+        frames.
         """
-        from gibench.datasets.torch_frames import TorchFrames
+        from gibench.datasets.torch_frames import torch_frames
 
         chosen = range(len(self.frames)) if frames is None else frames
         assert self._dataset is not None
-        files = [str(file) for file in self.frames["file"].iloc[list(chosen)]]
-        items = TorchFrames(self._dataset.root, files, channels)
+        items = torch_frames(self._dataset, channels, chosen)
         return cast("TorchDataset[dict[str, Tensor]]", _Handed(items, chosen, self._booking))
 
     @cached_property
@@ -136,8 +137,11 @@ class _Handed:  # as torch asks of a map-style dataset; its base class would hav
         return len(self._numbers)
 
     def __getitem__(self, index: int) -> dict[str, Tensor]:
+        return self.read(index)
+
+    def read(self, index: int, window: Sequence[int] | None = None) -> dict[str, Tensor]:
         self._booking.book(self._numbers[index])
-        return self._items[index]
+        return cast("dict[str, Tensor]", self._items.read(index, window))
 
 
 def training_set(root: Path | None, room: int | None = None) -> TrainingSet:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import shutil
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -24,7 +25,9 @@ from gibench.benchmarks.result_files import FORMAT, RunFolder, key_of
 from gibench.benchmarks.scenes import SceneFiles, refuse_files_outside, scene_name, scenes_in
 from gibench.benchmarks.settings import Choice, base_settings
 from gibench.datasets.errors import MakingError
+from gibench.datasets.loading import open_dataset
 from gibench.datasets.making import Progress, make
+from gibench.rendering.channels import resolve
 
 if TYPE_CHECKING:
     from gibench.benchmarks.on_cluster import Crew
@@ -108,6 +111,7 @@ class Run:
         if any(found.method.channels or found.method.trains for found, _ in order.methods):
             self._make_panoramas()
             self._make("training")
+            self._cache_training()
         self.spent["scenes"] += time.perf_counter() - began
         self.scenes = [s for s in scenes_in(*self.folder.references) if s.room < order.room_count]
         for scene in self.scenes:
@@ -226,6 +230,18 @@ class Run:
             on_progress=tell,
         )
         self.state.scenes = None
+
+    def _cache_training(self) -> None:
+        """Decode once what trainings read over and over, unless that takes more than half of the disk's room."""
+        trained = [found.method for found, _ in self.order.methods if found.method.trains]
+        names = resolve([name for method in trained for name in method.channels])
+        if not names:
+            return
+        from gibench.datasets.cache import cache_bytes, make_cache
+
+        root = self.folder.dataset("training")
+        if 2 * cache_bytes(open_dataset(root), names) < shutil.disk_usage(root).free:
+            make_cache(root, names)
 
     def jobs(self, methods: Sequence[tuple[Found, Sequence[Choice]]]) -> list[Job]:
         """Every result that is to be there, scene by scene."""

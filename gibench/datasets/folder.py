@@ -21,6 +21,7 @@ PREVIEW = "preview.png"
 RECORD = "frames.json"
 LOCK = ".lock"
 ENVIRONMENTS = "environments"
+CACHE = "cache"
 
 #: Beginning of the name of a file by which workers of a cluster prove that they see a folder.
 TOKEN = ".cluster-"
@@ -99,7 +100,7 @@ def claimed(root: Path) -> Iterator[None]:
     try:
         made = [folder for folder in (root, *root.parents) if not folder.exists()]
         root.mkdir(parents=True, exist_ok=True)
-        refuse_links(root, [root / "rooms", root / ENVIRONMENTS])
+        refuse_links(root, [root / "rooms", root / ENVIRONMENTS, root / CACHE])
         if not (root / MANIFEST).exists():
             _refuse_foreign(root)
         lock = lock_folder(root)

@@ -207,13 +207,14 @@ class Dataset:
         """Return a map-style `torch.utils.data.Dataset` over the same frames.
 
         Each item is a dict: channel → float32 tensor (C, H, W), or int64 for ids. It can be sent to the
-        worker processes of a `DataLoader`. Raises `DatasetError` where torch is not installed.
+        worker processes of a `DataLoader`. Items come out of the dataset's cache where `gibench dataset cache` has put
+        these channels into one. Raises `DatasetError` where torch is not installed.
         """
         try:
-            from gibench.datasets.torch_frames import TorchFrames
+            from gibench.datasets.torch_frames import torch_frames
         except ImportError:
             raise DatasetError("torch is not installed: pip install 'gibench[bench]'") from None
-        return TorchFrames(self.root, list(self.frames["file"]), channels)
+        return torch_frames(self, channels)
 
 
 def open_dataset(root: str | Path) -> Dataset:

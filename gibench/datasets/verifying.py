@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gibench import gate
+from gibench.datasets.cache import cache_faults
 from gibench.datasets.errors import DatasetError, StorageError
 from gibench.datasets.exr import decode, is_radiance, total_of_parts
 from gibench.datasets.exr_header import HeaderError, read_header
@@ -71,6 +72,8 @@ def verify(root: Path, on_room: Callable[[int, int], None] = lambda done, of: No
     on_room(len(expected), len(expected))
     problems.extend(_panorama_problems(root, records))
     problems.extend(_table_problems(root, records, recipe))
+    if len(records) == len(expected):
+        problems.extend(Problem(*fault) for fault in cache_faults(root, frame_table(records, recipe)))
     if not (root / PREVIEW).is_file():
         problems.append(Problem(PREVIEW, "the contact sheet is missing: `gibench dataset preview` makes it"))
     return problems

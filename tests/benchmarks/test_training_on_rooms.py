@@ -6,6 +6,8 @@ from gibench.benchmarks.orders import Order, ordered_methods
 from gibench.benchmarks.result_files import RunFolder
 from gibench.benchmarks.running import run
 from gibench.benchmarks.track import check_track
+from gibench.datasets import open_dataset
+from gibench.datasets.cache import opened_cache
 from tests.benchmarks import toys
 from tests.benchmarks.conftest import TINY
 
@@ -36,6 +38,11 @@ def test_a_training_on_rooms(tmp_path):
     assert seconds[0] == seconds[1] > 0
     assert all(r["prepare"]["references"] > 0 for r in good)
     assert [training["method"] for training in told if training] == ["learner"]
+
+    # What it reads over and over is decoded once, outside of its clock.
+    cache = opened_cache(open_dataset(folder.dataset("training")))
+    assert cache is not None
+    assert cache.channels == {"color"}
 
     (failed,) = [r for r in records if r["status"] == "failed"]
     assert failed["reason"] == "in the training: ValueError: nothing to learn"
