@@ -43,6 +43,9 @@ SAMPLES_OF: dict[str, tuple[str, ...]] = {
 MOVING = ("position", "shape_id", "motion", "motion_valid")
 
 
+#: Keys of a recipe that mean generated rooms alone.
+OF_ROOMS = ("kinds", "gloss", "environment")
+
 #: Keys of a recipe for frames that are held out.
 HELD_OUT = ("path_views", "held_out", "sequences")
 
@@ -144,7 +147,10 @@ class Preset(_Strict):
         if which == "training" and panoramas is not None:
             named = values.get("environments", ())
             values["environments"] = [*([named] if isinstance(named, str) else named), str(panoramas)]
-        if which == "training" and self.training_rooms is not None:
+        on_rooms = which == "training" and self.training_rooms is not None
+        if scenes and not on_rooms:
+            values = {key: value for key, value in values.items() if key not in OF_ROOMS}
+        if on_rooms:
             apart = (*HELD_OUT, "path", "path_rooms", *(scenes or {}))
             values = {key: value for key, value in values.items() if key not in apart}
             values |= {"rooms": self.training_rooms, "seed": self.training_seed, "rendered": "all"}

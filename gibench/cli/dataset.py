@@ -50,7 +50,9 @@ Folder = Annotated[Path, typer.Argument(metavar="DIR", help="The dataset's folde
 def make(
     rooms: Annotated[int | None, typer.Option(help="How many rooms.", show_default="the preset's")] = None,
     out: Annotated[Path | None, typer.Option(help="Where to.", show_default="data/PRESET")] = None,
-    preset: Annotated[str | None, typer.Option(help="smoke, small or paper.", show_default="small")] = None,
+    preset: Annotated[
+        str | None, typer.Option(help="smoke, small, paper or unseen.", show_default="small")
+    ] = None,
     recipe: Annotated[
         Path | None, typer.Option(help="A recipe of your own (TOML).", show_default=False)
     ] = None,

@@ -108,7 +108,11 @@ def dry_run(recipe: Recipe, variant: str, workers: int) -> None:
     with counting("rooms built and checked") as on_room:
         result = estimate(recipe, variant=variant, workers=workers, on_room=on_room)
     most = "at most " if recipe.spp is None else "about "
-    say(_row("rooms", f"{result.rooms} built and checked, {1000 * result.build_seconds:.0f} ms each"))
+    built = f"{1000 * result.build_seconds:.0f} ms each"
+    if result.checked < recipe.rooms:
+        say(_row("rooms", f"about {result.rooms}, of which {result.checked} were built and checked, {built}"))
+    else:
+        say(_row("rooms", f"{result.rooms} built and checked, {built}"))
     _print_rejections(result.rejections, result.rejected_rooms)
     say(_row("frames", f"{result.frames}, about {result.seconds_per_frame:.2g} s each"))
     speed = amount(result.paths_per_second, "paths/s")

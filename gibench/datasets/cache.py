@@ -244,24 +244,34 @@ class FrameCache:
             self._arrays[name] = _mapped(self.root, name, self._record)
         return self._arrays[name]
 
-    def read(
+    def stored(
         self, file: str, channels: Iterable[str], window: Window | None = None
-    ) -> dict[str, NDArray[Any]]:
-        """Channel → (C, H, W) float32, or uint32 for ids, of a frame, or of a window of it.
+    ) -> dict[str, tuple[NDArray[Any], int]]:
+        """Channel → (C, H, W) of a frame, or of a window of it, and the exponent of the power of two that it lacks.
 
-        file: as in the table. Raises DatasetError for an array that is not what the record says.
+        file: as in the table. What is given is a part of the array itself: copy it. Raises DatasetError for an array
+        that is not what the record says.
         """
         number = self._numbers[file]
-        found: dict[str, NDArray[Any]] = {}
+        found = {}
         for name in channels:
             values = self._array(name)[number]
             if window is not None:
                 top, left, height, width = window
                 values = values[:, top : top + height, left : left + width]
             exponents = self._record["channels"][name]["exponents"]
+            found[name] = values, exponents[number] if exponents else 0
+        return found
+
+    def read(
+        self, file: str, channels: Iterable[str], window: Window | None = None
+    ) -> dict[str, NDArray[Any]]:
+        """Channel → (C, H, W) float32, or uint32 for ids, of a frame, or of a window of it; see `stored`."""
+        found: dict[str, NDArray[Any]] = {}
+        for name, (values, exponent) in self.stored(file, channels, window).items():
             found[name] = values.astype(np.uint32 if values.dtype == TYPES["uint"] else np.float32)
-            if exponents and exponents[number]:
-                np.ldexp(found[name], exponents[number], out=found[name])
+            if exponent:
+                np.ldexp(found[name], exponent, out=found[name])
         return found
 
 
@@ -310,7 +320,8 @@ def _mapped(root: Path, name: str, record: Mapping[str, Any]) -> NDArray[Any]:
     width, height = record["size"]
     shape = (record["count"], CHANNELS[name].components, height, width)
     try:
-        array = np.load(gate.inside(root, place), mmap_mode="r", allow_pickle=False)
+        # Pages that somebody writes to are copied; torch warns of arrays that nobody may write to.
+        array = np.load(gate.inside(root, place), mmap_mode="c", allow_pickle=False)
         if array.shape != shape or array.dtype != TYPES[CHANNELS[name].dtype]:
             raise ValueError(f"it is {array.dtype} of shape {array.shape}")
     except (gate.GateError, ValueError, OSError) as problem:

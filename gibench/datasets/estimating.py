@@ -23,13 +23,17 @@ if TYPE_CHECKING:
 #: renderer. Fewer would count what a pass costs at any size, such as tracing Python, as if each path cost it.
 MEASURED_WIDTH, MEASURED_SPP = 256, 64
 
+#: Rooms that are built and checked of a larger dataset, spread evenly over it; counts are scaled then.
+MOST_CHECKED = 100
+
 
 @dataclass
 class Estimate:
     """Cost of a dataset on this machine.
 
-    rooms, frames, rejected_rooms, rejections: counted, not estimated (frames: of the rooms that could be built;
-    rejections: reason → count over rooms and views). build_seconds: per room, measured on all rooms.
+    checked: rooms that were built or refused, all of them or MOST_CHECKED. rooms, frames, rejected_rooms, rejections:
+    counted over these (frames: of the rooms that could be built; rejections: reason → count over rooms and views),
+    rooms and frames scaled to all rooms. build_seconds: per room, measured on those that were checked.
     paths_per_second, seconds_per_frame, bytes_per_room, bytes_per_frame: scaled from one measured frame. seconds: wall
     time of the whole making.
     With a recipe that stops at an error, samples are taken to reach the cap, so that seconds are the most
@@ -38,6 +42,7 @@ class Estimate:
 
     recipe: Recipe
     workers: int
+    checked: int = 0
     rooms: int = 0
     frames: int = 0
     variant: str = ""
@@ -132,11 +137,14 @@ def estimate(
 ) -> Estimate:
     """Build and check every room of a recipe; estimate time and disk from one small frame.
 
-    on_room: called with (rooms checked, rooms in all). work: what workers do, by default `RoomChecker`.
+    Of more than MOST_CHECKED rooms so many are built, spread evenly over them. on_room: called with (rooms checked,
+    rooms to be checked). work: what workers do, by default `RoomChecker`.
     Raises `MakingError`.
     """
     result = Estimate(recipe, workers)
     build_seconds: list[float] = []
+    share = max(1.0, recipe.rooms / MOST_CHECKED)
+    numbers = [int(number * share) for number in range(min(recipe.rooms, MOST_CHECKED))]
 
     def ready(facts: dict[str, Any]) -> None:
         result.variant = facts["variant"]
@@ -151,11 +159,13 @@ def estimate(
             build_seconds.append(answer["seconds"])
         if answer.get("measured"):
             _scale(result, answer["measured"])
-        on_room(result.rooms + len(result.rejected_rooms), recipe.rooms)
+        result.checked += 1
+        on_room(result.checked, len(numbers))
 
     work = work or pool.Work(Renderer(variant, default_threads(workers), recipe), RoomChecker(recipe))
     listener = pool.Listener(ready, lambda room, kind, content: None, done, lambda room: None)
-    pool.run_rooms(work, range(recipe.rooms), listener, workers=min(workers, recipe.rooms))
+    pool.run_rooms(work, numbers, listener, workers=min(workers, len(numbers)))
+    result.rooms, result.frames = round(result.rooms * share), round(result.frames * share)
     result.build_seconds = sum(build_seconds) / max(len(build_seconds), 1)
     return result
 

@@ -22,6 +22,7 @@ RECORD = "frames.json"
 LOCK = ".lock"
 ENVIRONMENTS = "environments"
 CACHE = "cache"
+CARD = "DATASET.md"
 
 #: Beginning of the name of a file by which workers of a cluster prove that they see a folder.
 TOKEN = ".cluster-"
@@ -60,7 +61,7 @@ def remove_partials(root: Path, room: int | None = None) -> None:
         for left in own_leftovers(root / ENVIRONMENTS, r"\.[0-9a-f]{64}\.exr\.partial-[0-9]+"):
             left.unlink(missing_ok=True)
         remove_tokens(root)
-        names = "|".join(map(re.escape, (MANIFEST, TABLE, PREVIEW)))
+        names = "|".join(map(re.escape, (MANIFEST, TABLE, PREVIEW, CARD)))
         for left in own_leftovers(root.resolve(), rf"\.({names})\.partial-[0-9]+"):
             if not gate.real_folder(left):
                 left.unlink(missing_ok=True)
@@ -82,7 +83,7 @@ def own_leftovers(folder: Path, pattern: str) -> list[Path]:
 
 def remove_empty_dataset(root: Path) -> None:
     """Remove what a dataset without any whole room consists of. Only for the holder of the lock."""
-    for name in (MANIFEST, TABLE, PREVIEW):
+    for name in (MANIFEST, TABLE, PREVIEW, CARD):
         (root / name).unlink(missing_ok=True)
     for panorama in own_leftovers(root / ENVIRONMENTS, r"[0-9a-f]{64}\.exr"):
         panorama.unlink()

@@ -16,7 +16,9 @@ from typing import Any
 
 from gibench.datasets import folder, pool
 from gibench.datasets import manifest as manifests
+from gibench.datasets.card import card
 from gibench.datasets.errors import Interrupted, MakingError
+from gibench.datasets.files import write_whole
 from gibench.datasets.previews import contact_sheet, write_picture
 from gibench.datasets.recipes import Recipe
 from gibench.datasets.room_making import Renderer, RoomMaker, given_cameras, machine
@@ -230,6 +232,7 @@ class _Run:
         manifests.write_table(self.root, table)
         if len(table):
             write_picture(self.root / folder.PREVIEW, contact_sheet(self.root, table))
+            write_whole(self.root / folder.CARD, card(self.root, manifest, table).encode())
         manifests.write_manifest(self.root, manifest)
         self.manifest = manifest
 

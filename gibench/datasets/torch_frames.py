@@ -41,16 +41,15 @@ class TorchFrames(Dataset[dict[str, torch.Tensor]]):
     def read(self, index: int, window: Window | None = None) -> dict[str, torch.Tensor]:
         """An item, or a window of it: top, left, height, width. Out of a cache nothing else is read then."""
         if self.cache is not None:
-            arrays = self.cache.read(self.files[index], self.channels, window)
-        else:
-            whole = decode(gate.inside(self.root, self.files[index]), self.channels, widen=True)
-            arrays = {name: np.moveaxis(values, -1, 0) for name, values in whole.items()}
-            if window is not None:
-                top, left, height, width = window
-                arrays = {
-                    name: values[:, top : top + height, left : left + width]
-                    for name, values in arrays.items()
-                }
+            stored = self.cache.stored(self.files[index], self.channels, window)
+            return {name: _widened(*values) for name, values in stored.items()}
+        whole = decode(gate.inside(self.root, self.files[index]), self.channels, widen=True)
+        arrays = {name: np.moveaxis(values, -1, 0) for name, values in whole.items()}
+        if window is not None:
+            top, left, height, width = window
+            arrays = {
+                name: values[:, top : top + height, left : left + width] for name, values in arrays.items()
+            }
         return {name: _tensor(values) for name, values in arrays.items()}
 
 
@@ -67,6 +66,14 @@ def torch_frames(
     if cache is not None and not cache.channels.issuperset(channels):
         cache = None
     return TorchFrames(dataset.root, [str(file) for file in chosen], channels, cache)
+
+
+def _widened(values: np.ndarray, exponent: int) -> torch.Tensor:
+    """A copy of a part of the cache. torch widens float16 several times faster than NumPy does."""
+    if values.dtype == np.uint32:
+        return _tensor(values)
+    tensor = torch.empty(values.shape, dtype=torch.float32).copy_(torch.from_numpy(values))
+    return torch.ldexp(tensor, torch.tensor(exponent)) if exponent else tensor
 
 
 def _tensor(values: np.ndarray) -> torch.Tensor:

@@ -146,6 +146,20 @@ def test_relight_trains_on_real_and_rendered_maps_and_is_scored_near_and_far(tmp
         }
 
 
+def test_every_track_takes_scene_files_in_the_place_of_rooms(tmp_path):
+    (tmp_path / "scene.xml").touch()
+    scenes = {"scenes": (str(tmp_path / "scene.xml"),), "up": "y"}
+    for name in track_names():
+        for preset in load_track(name).presets.values():
+            reference = preset.recipe("reference", scenes=scenes)
+            training = preset.recipe("training", preset.training_rooms, scenes)
+            assert (reference.scenes, reference.up, reference.gloss) == (scenes["scenes"], "y", "any")
+            if preset.training_rooms is None:
+                assert training.scenes == scenes["scenes"]
+            else:  # what is trained on are rooms all the same
+                assert training == preset.recipe("training")
+
+
 ROOMS = {"prepare_on": "rooms"}
 OWN = {"training_rooms": 3, "training_seed": 9}
 

@@ -33,3 +33,14 @@ def test_time_and_disk_are_scaled_to_the_recipe():
 def test_frames_without_radiance_have_no_paths():
     result = estimated(tiny(1, channels=("surface",)), paths_per_second=0.0)
     assert result.seconds_per_frame == 16 * 12 * 1e-3
+
+
+def test_of_many_rooms_some_are_built_and_counts_are_scaled():
+    done = []
+    recipe = tiny(1500)
+    answer = {"frames": 2, "rejections": {}, "seconds": 0.25, "measured": MEASURED}
+    work = Work(Answer({"variant": "fake"}), Answer(answer))
+    result = estimate(recipe, work=work, workers=2, on_room=lambda n, of: done.append((n, of)))
+    assert done[-1] == (100, 100)
+    assert (result.checked, result.rooms, result.frames) == (100, 1500, 3000)
+    assert abs(result.build_seconds - 0.25) < 1e-9

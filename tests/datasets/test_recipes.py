@@ -8,7 +8,7 @@ from gibench.rendering.channels import resolve
 
 
 def test_presets_are_those_that_the_readme_names():
-    assert preset_names() == ("paper", "small", "smoke")
+    assert preset_names() == ("paper", "small", "smoke", "unseen")
     smoke, small, paper = (load_preset(name) for name in ("smoke", "small", "paper"))
     assert (smoke.rooms, smoke.views, smoke.resolution, smoke.spp, smoke.denoise) == (
         2,

@@ -16,7 +16,8 @@ WINDOW = (20, 30, 64, 64)
 
 
 def test_reading(tmp_path):
-    pytest.importorskip("torch")
+    torch = pytest.importorskip("torch")
+    torch.set_num_threads(1)  # as in the workers of a DataLoader
     root = tmp_path / "d"
     make(root, load_preset("small", {"rooms": 1, "views": 6, "resolution": (192, 128), "spp": 16}))
     dataset = open_dataset(root)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -107,6 +107,7 @@ def trained_network(
         **settings,
         **asdict(plan),
         "views": views.hexdigest(),
+        "seconds": site.seconds,
         "torch": torch.__version__,
     }
     owner = {"method": "elp", "sources": digest(__name__), "views": views.hexdigest(), **asdict(plan)}
@@ -114,7 +115,7 @@ def trained_network(
     def make(folder: Path) -> float:
         checkpoint = Checkpoint(site.bakes.checkpoint(folder), owner)
         learner = Reconstructing(examples(), plan)
-        trained = learner.trained(checkpoint)
+        trained = learner.trained(checkpoint, site.seconds)
         epoch = trained.best.step // learner.steps_of_epoch
         artifacts.keep(folder, trained, epoch=epoch, **asdict(learner.scale))
         return trained.before
@@ -186,9 +187,10 @@ class Reconstructing(Learner):
             patience=(patience + 1) // every * every * self.steps_of_epoch,
         )
 
-    def trained(self, checkpoint: Checkpoint | None = None) -> Trained:
-        """Train to the end, or until the held-out view gets no better."""
-        return train(self, self.batches, self.budget, seed=self.plan.seed, checkpoint=checkpoint, title="elp")
+    def trained(self, checkpoint: Checkpoint | None = None, seconds: float | None = None) -> Trained:
+        """Train to the end, until the held-out view gets no better, or until the seconds are over."""
+        budget = replace(self.budget, seconds=seconds)
+        return train(self, self.batches, budget, seed=self.plan.seed, checkpoint=checkpoint, title="elp")
 
     def batches(self, first: int) -> Iterator[Crops]:
         """Crops from that step on, without end."""

@@ -16,6 +16,7 @@ import datasets
 import yaml
 from PIL import Image
 
+from gibench.datasets.card import channel_table
 from gibench.datasets.export.frames import picture, row_of
 from gibench.datasets.loading import Dataset
 from gibench.rendering.channels import CHANNELS
@@ -103,10 +104,6 @@ def _card(dataset: Dataset, names: tuple[str, ...], splits: list[str]) -> str:
             }
         ],
     }
-    channels = "\n".join(
-        f"| `{name}` | {CHANNELS[name].components} | {CHANNELS[name].unit} | {CHANNELS[name].meaning} |"
-        for name in names
-    )
     return f"""---
 {yaml.safe_dump(head, sort_keys=False)}---
 
@@ -120,7 +117,5 @@ Mitsuba {manifest["versions"].get("mitsuba", "")} by gibench {manifest["versions
 (3 × 3) in pixels, the outer corner of the first pixel at (0, 0). Radiance is linear Rec. 709; `image` is for people.
 Splits go by room.
 
-| channel | components | unit | meaning |
-| --- | --- | --- | --- |
-{channels}
+{channel_table(names)}
 """

@@ -111,6 +111,13 @@ def test_it_stops_where_the_held_out_view_gets_no_better():
     assert trained.steps == 21 * learner.steps_of_epoch  # half of the epochs, and the one that is too many
 
 
+def test_seconds_end_it_with_the_best_so_far():
+    trained = Reconstructing(EXAMPLES, dataclasses.replace(PLAN, epochs=1000)).trained(seconds=0.05)
+    assert trained.ended == "seconds"
+    assert trained.steps < 1000
+    assert trained.best.error == min(look.error for look in trained.curve)
+
+
 @pytest.mark.parametrize(
     ("epochs", "every", "last"), [(40, 1, 21), (50, 1, 26), (100, 2, 50), (1000, 20, 500)]
 )
