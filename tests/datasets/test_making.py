@@ -48,6 +48,7 @@ def undisturbed(tmp_path_factory) -> Path:
 
 def test_what_a_dataset_holds(undisturbed):
     assert sorted(path.name for path in undisturbed.iterdir()) == [
+        "DATASET.md",
         "dataset.json",
         "frames.parquet",
         "preview.png",
