@@ -13,7 +13,15 @@ from gibench.benchmarks.statistics import difference, floor, leaderboard, verdic
 ROOMS, FRAMES = 6, 5
 
 
-def fake(errors: dict[str, float], *, noise: float = 0.01, seeds=(0,), machines=("m",), name: str = "rmse"):
+def fake(
+    errors: dict[str, float],
+    *,
+    noise: float = 0.01,
+    seeds=(0,),
+    machines=("m",),
+    name: str = "rmse",
+    unbiased=(),
+):
     """Results of methods whose error in frame f of room r is known; only tables, as `Results` gives them."""
     rng = np.random.default_rng(0)
     level = rng.uniform(0.5, 1.5, (ROOMS, FRAMES))
@@ -55,6 +63,7 @@ def fake(errors: dict[str, float], *, noise: float = 0.01, seeds=(0,), machines=
             [(f"room-{r}", f, name, "full", noise) for r in range(ROOMS) for f in range(FRAMES)],
             columns=["scene", "frame", "metric", "part", "value"],
         ),
+        unbiased=frozenset(unbiased),
         records=lambda: [{"config": {"scene": f"room-{r}", "scene_sha256": str(r)}} for r in range(ROOMS)],
         level=level,
     )
@@ -114,6 +123,16 @@ def test_no_difference_below_the_noise_floor_is_called_one():
     found = difference((results, "a"), (results, "b"), "rmse", "full")
     assert found.interval.excludes_zero
     assert found.verdict == "below the noise floor"
+
+
+def test_what_is_against_the_truth_does_not_depend_on_the_reference():
+    """Its noise is in the interval; two runs of which one is against the reference are compared as that is."""
+    results = fake({"a": 0.10, "b": 0.15}, noise=0.06, unbiased=["rmse"])
+    found = difference((results, "a"), (results, "b"), "rmse", "full")
+    assert np.isnan(found.floor)
+    assert found.verdict == "better"
+    before = fake({"a": 0.10, "b": 0.15}, noise=0.06)
+    assert difference((results, "a"), (before, "b"), "rmse", "full").verdict == "below the noise floor"
 
 
 def test_the_floor_is_a_distance_from_the_perfect_value():
