@@ -34,7 +34,7 @@ METHOD = Method(
     ),
     knobs=(
         Knob(
-            "network", "full", ("small", "full"), "1.24 or the paper's 14.65 million parameters", trains=True
+            "network", "full", ("small", "full"), "1.20 or the paper's 14.65 million parameters", trains=True
         ),
         Knob("lpips", True, (False, True), "whether the perceptual loss is trained for", trains=True),
         Knob("cnn", True, (False, True), "whether a U-Net looks at the screen", trains=True),

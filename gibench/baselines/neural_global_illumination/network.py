@@ -57,6 +57,11 @@ SMALL = Size((16, 32, 64, 128, 128), 32, 128, 6, 5, ("position", "normal", "view
 """For processors without a GPU. Directions and positions alone are encoded: of light, high frequencies mean nothing."""
 
 
+CALM = 0.1
+"""Of the first weights of the last layer. Those of encoded inputs are halved from frequency to frequency: networks that
+begin smooth find what is smooth first, and need no steps to forget the grain that they began with."""
+
+
 class NeuralGlobalIllumination(nn.Module):
     """See the module."""
 
@@ -79,6 +84,25 @@ class NeuralGlobalIllumination(nn.Module):
         for layer in self.hidden:
             nn.init.kaiming_uniform_(layer.weight, nonlinearity="relu")  # type: ignore[arg-type]
             nn.init.zeros_(layer.bias)  # type: ignore[arg-type]
+        with torch.no_grad():
+            for number, before in ((0, 0), (JOINED, size.width)):
+                if number < size.depth:
+                    columns = slice(
+                        before + inputs, before + inputs + 2 * size.frequencies * len(self.encoded)
+                    )
+                    self.hidden[number].weight[:, columns] *= self._calm()  # type: ignore[operator, index]
+            self.last.weight *= CALM
+            self.last.bias.zero_()  # type: ignore[union-attr]
+
+    def begin_at(self, code: Tensor) -> None:
+        """Begin with the same code (3,) everywhere: the mean of what is to be learned."""
+        with torch.no_grad():
+            self.last.bias.copy_(code)  # type: ignore[union-attr]
+
+    def _calm(self) -> Tensor:
+        """Factors of the first weights of encoded inputs, (2 · frequencies · encoded, 1, 1)."""
+        levels = torch.arange(self.size.frequencies).repeat_interleave(len(self.encoded)).repeat(2)
+        return (0.5**levels)[:, None, None]
 
     def forward(self, pixels: Tensor) -> Tensor:
         """(N, inputs, H, W) of any size, HDR among it compressed, to the code of radiance (N, 3, H, W)."""

@@ -151,6 +151,7 @@ class Predicting(Learner):
         self.examples, self.plan = examples, plan
         with seeded(plan.seed):
             self.network = NeuralGlobalIllumination(plan.size)
+        self.network.begin_at(torch.stack([one.code.mean(dim=(1, 2)) for one in judged]).mean(dim=0))
         self.network.to(device)
         self.held_out = [Example(*(part.to(device) for part in one)) for one in judged]
         self.judge = Lpips().to(device) if plan.lpips else None
