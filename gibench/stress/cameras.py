@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import mitsuba as mi
 import numpy as np
 
 from gibench.generators.parts import Camera
@@ -101,6 +100,8 @@ def field_of_view(degrees: float) -> Found:
 @case("looking exactly along {sign}Z", sign=("+", "-"), quick=("-",))
 def along_z(sign: str) -> Found:
     """No horizon: the view check, the frame and scene.xml must still agree on one."""
+    import mitsuba as mi
+
     towards = 1.0 if sign == "+" else -1.0
     camera = PinholeCamera((0.0, 0.0, 0.0), (0.0, 0.0, towards), np.radians(60))
     yield from plane_checks(camera, 2, 2 * towards)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import mitsuba as mi
 import numpy as np
 
 from gibench.baselines import (
@@ -75,6 +74,8 @@ MATERIALS: dict[str, dict[str, Any]] = {
 
 def room(floor: dict[str, Any]) -> Scene:
     """A closed cube of black sides that emit 1, but for the floor: whatever it reflects, it reflects uniform light."""
+    import mitsuba as mi
+
     if floor.get("texture") is BUMPS:
         slope = np.linspace(0, 0.02, 4, dtype=np.float32)[:, None, None] * np.ones(
             (1, 4, 1), dtype=np.float32

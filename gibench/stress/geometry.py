@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import norm
 
-from gibench.baselines.lightmap.bake import bake_atlas
 from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.render import render_frame
 from gibench.rendering.scene import Scene, SceneError, load_dict
@@ -54,6 +52,8 @@ def in_balance(vertices: ArrayLike, faces: ArrayLike) -> Scene:
 
 def lightmap_checks(scene: Scene, radiance: float, known: str = "") -> Found:
     """A bake where every texel sees the same radiance in all directions: pi times that."""
+    from gibench.baselines.lightmap.bake import bake_atlas
+
     baked = bake_atlas(scene, texels_per_metre=4, spp=64, denoise=False, max_depth=DEPTH)
     texels = baked.atlas[baked.charts >= 0].astype(np.float64).mean(axis=-1)
     answer = np.pi * radiance
@@ -168,6 +168,8 @@ def rays_through_vertices() -> Found:
 @case("walls of {thickness:g} m in bright light", thickness=(1e-3, 1e-4), quick=(1e-3,))
 def thin_walls(thickness: float) -> Found:
     """A dark room whose walls keep out a sky of 1e6: not one path may get in."""
+    import mitsuba as mi
+
     walls: dict[str, Any] = {}
     for axis in range(3):
         for side in (-1, 1):
@@ -186,6 +188,8 @@ def thin_walls(thickness: float) -> Found:
 @case("inverted normals", quick=True)
 def inverted_normals() -> Found:
     """A floor that is wound the wrong way round, and one whose normals contradict its winding."""
+    import mitsuba as mi
+
     corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], dtype=float)
     camera = PinholeCamera((0.0, -1.0, 1.0), (0.0, 0.0, 0.0), 0.1)
     for what, faces, normal in (
@@ -214,6 +218,8 @@ def inverted_normals() -> Found:
 @case("mesh without triangles", quick=True)
 def mesh_without_triangles() -> Found:
     """Refused by name."""
+    import mitsuba as mi
+
     refused = False
     try:
         load_dict({"type": "scene", "nothing": mi.Mesh("nothing", 0, 0)})

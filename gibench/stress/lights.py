@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, tostring
 
-import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,7 +18,7 @@ from gibench.generators.parts import Environment, Light
 from gibench.metrics import reference_exposure, relmse, tone_map
 from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.render import RenderedFrame, render_frame
-from gibench.rendering.scene import Scene, SceneError, load_dict, wrap
+from gibench.rendering.scene import Scene, SceneError, load_dict
 from gibench.stress.answers import (
     mean_check,
     not_finite,
@@ -246,6 +245,8 @@ ROWS = (
 @case("sun of 64,890 in a sky of mean 1", quick=True)
 def sun_in_a_panorama() -> Found:
     """Half of the light comes from one texel in 131,072."""
+    import mitsuba as mi
+
     sky = panorama()
     upright = mi.ScalarTransform4f().rotate([1, 0, 0], 90)
     light = {"type": "envmap", "bitmap": mi.Bitmap(sky), "to_world": upright}
@@ -265,7 +266,10 @@ def sun_in_a_panorama() -> Found:
 
 def from_file(sky: NDArray[np.float32], folder: Path) -> Scene:
     """The floor below a panorama that has gone the way of a user's: .exr, then the .hdr beside a room."""
+    import mitsuba as mi
     import OpenEXR
+
+    from gibench.rendering.scene import wrap
 
     source = folder / "sky.exr"
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}

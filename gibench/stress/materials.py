@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-import mitsuba as mi
 import numpy as np
 
-from gibench.baselines.first_hits import first_hits
-from gibench.baselines.image_space_gathering import reflectance
 from gibench.datasets import exr
 from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.render import render_frame
@@ -80,6 +77,11 @@ def metal_in_uniform_light(alpha: float) -> Found:
 
 def split_sum(scene: Any, alpha: float) -> Check:
     """Factor of image space gathering for its blurred mirror image, against the quadrature."""
+    import mitsuba as mi
+
+    from gibench.baselines.first_hits import first_hits
+    from gibench.baselines.image_space_gathering import reflectance
+
     checks = []
     for degrees in (0.1, 45, 80):
         hits = first_hits(scene, spot(degrees), (1, 1))

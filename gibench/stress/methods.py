@@ -8,7 +8,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import mitsuba as mi
 import numpy as np
 
 from gibench.baselines import (
@@ -21,11 +20,7 @@ from gibench.baselines import (
 )
 from gibench.baselines.bakes import BakeCache
 from gibench.baselines.method import Method, Prediction, Site, View
-from gibench.baselines.nearest_probe.lookup import NearestProbe
-from gibench.baselines.probes.baking import POSITIONS, ProbeSettings, baked_files
-from gibench.baselines.probes.maps import load_probes
 from gibench.baselines.stages import Stages
-from gibench.baselines.unstructured_lumigraph.blending import UnstructuredLumigraph
 from gibench.datasets.exr import HALF_TOLERANCE
 from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.lighting import Shot
@@ -158,6 +153,8 @@ def near_mirror_from_a_probe() -> Found:
 
     The camera stands exactly where a probe stands, and another at the floor below it, so that distances are 0.
     """
+    from gibench.baselines.probes.baking import POSITIONS, ProbeSettings, baked_files
+
     scene = cube(1.0, metal(NEAR_MIRROR))
     with prepared(scene) as site:
         positions = np.load(baked_files(site, ProbeSettings(8, 64, 32, 64), ("radiance",))[POSITIONS])
@@ -192,6 +189,13 @@ def near_mirror_from_a_probe() -> Found:
 
 def looked_up(site: Site, positions: Any) -> Any:
     """Results of both probe methods for points that lie on the probes, seen from the probes."""
+    import mitsuba as mi
+
+    from gibench.baselines.nearest_probe.lookup import NearestProbe
+    from gibench.baselines.probes.baking import ProbeSettings
+    from gibench.baselines.probes.maps import load_probes
+    from gibench.baselines.unstructured_lumigraph.blending import UnstructuredLumigraph
+
     probes = load_probes(site, ProbeSettings(8, 64, 32, 64), UnstructuredLumigraph.maps)
     points = mi.Point3f(np.ascontiguousarray(positions.T, dtype=np.float32))
     camera = mi.Point3f([float(c) for c in positions[0]])

@@ -8,28 +8,16 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
 from gibench import metrics
-from gibench.baselines.image_space_gathering.gathering import WIDEST, lobe_angle
-from gibench.baselines.probes.mappings import LatLong, Octahedral
-from gibench.baselines.unstructured_lumigraph.blending import (
-    HIDDEN,
-    LEAST_RESOLUTION,
-    RESOLUTION_WEIGHT,
-    penalty,
-    weights,
-)
 from gibench.benchmarks.report.image_files import LARGEST, STEPS_PER_STOP, TOE, decode, encode
 from gibench.datasets import exr
-from gibench.datasets.torch_frames import TorchFrames
 from gibench.metrics.errors import EmptyMaskWarning
 from gibench.metrics.tone_map import linear_from_srgb, srgb_from_linear
 from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.denoise import denoise
-from gibench.rendering.integrator import mis_weight
 from gibench.rendering.render import render_frame
 from gibench.rendering.scene import load_dict
 from gibench.stress.answers import Float64, not_finite
@@ -48,11 +36,15 @@ SEAM = 0.0031308
 
 def drjit(values: Any) -> Any:
     """A mi.Float of numbers."""
+    import mitsuba as mi
+
     return mi.Float(np.asarray(values, dtype=np.float32).ravel())
 
 
 def points(values: Any) -> Any:
     """A mi.Point3f of (N, 3) numbers."""
+    import mitsuba as mi
+
     return mi.Point3f(np.ascontiguousarray(np.asarray(values, dtype=np.float32).T))
 
 
@@ -69,6 +61,8 @@ def apart(found: Float64, answer: Float64) -> float:
 @case("weights of multiple importance sampling", quick=True)
 def mis_weights() -> Found:
     """Densities from 1e-30, of the sky from far away, to 1e30, of the middle of a near-mirror's lobe."""
+    from gibench.rendering.integrator import mis_weight
+
     grid = np.concatenate([[0.0], 10.0 ** np.arange(-30, 31)]).astype(np.float32)
     first, second = (side.ravel() for side in np.meshgrid(grid, grid))
     a, b = first.astype(np.float64), second.astype(np.float64)
@@ -83,6 +77,8 @@ def mis_weights() -> Found:
 @case("footprint of a glossy lobe", quick=True)
 def lobe_angles() -> Found:
     """From no roughness to 1, from the middle of the lobe to its end."""
+    from gibench.baselines.image_space_gathering.gathering import WIDEST, lobe_angle
+
     roughness = np.array([0, 1e-30, 1e-6, 1e-4, 1e-3, 1e-2, 0.1, 0.5, 1], dtype=np.float32)
     share = np.array([0, 1e-30, 1e-6, 0.1, 0.5, 0.9, 0.999, 1 - 2.0**-16], dtype=np.float32)
     alpha, u = (side.ravel().astype(np.float64) for side in np.meshgrid(roughness, share))
@@ -100,6 +96,12 @@ def lobe_angles() -> Found:
 @case("penalty of a probe at extreme places", quick=True)
 def probe_penalties() -> Found:
     """The probe at the camera, at the point, behind it, and ten kilometres away."""
+    from gibench.baselines.unstructured_lumigraph.blending import (
+        LEAST_RESOLUTION,
+        RESOLUTION_WEIGHT,
+        penalty,
+    )
+
     places = np.array(
         [[0, 0, 0], [0, 0, 1], [0, 1e-6, 1], [1, 0, 0], [0, 0, -1], [1e-7, 0, 0], [1e4, 0, 0], [0, 0, 1e4]],
         float,
@@ -132,6 +134,8 @@ def probe_penalties() -> Found:
 @case("weights of probes at extreme penalties", quick=True)
 def probe_weights() -> Found:
     """A softmax's hard cases: all equal, one far better, none that sees the point, a penalty of nearly nothing."""
+    from gibench.baselines.unstructured_lumigraph.blending import HIDDEN, weights
+
     rows = np.array(
         [
             [1e-5, 1e-5, 1e-5, 1e-5, 1e-5],
@@ -158,6 +162,8 @@ def probe_weights() -> Found:
 @case("directions on probe maps", quick=True)
 def probe_directions() -> Found:
     """Poles, seams, lengths from 1e-30 to 1e30, and no direction at all."""
+    from gibench.baselines.probes.mappings import LatLong, Octahedral
+
     rng = np.random.default_rng(0)
     axes = np.array(
         [[x, y, z] for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if x or y or z], float
@@ -314,6 +320,8 @@ def empty_masks() -> Found:
 @case("training inputs from half floats", quick=True)
 def training_inputs() -> Found:
     """Inputs of a network from a file against the rendered values."""
+    from gibench.datasets.torch_frames import TorchFrames
+
     lamp = rectangle([0, 0, 1], [0, 0, -1], (0.3, 0.3), bsdf=diffuse(0.0), emitter=area(9e4))
     floor = rectangle([0, 0, 0], [0, 0, 1], (1, 1), bsdf=coat(0.05, 0.4, 0.2, 1e-3))
     scene = load_dict({"type": "scene", "lamp": lamp, "floor": floor})
@@ -342,6 +350,8 @@ def training_inputs() -> Found:
 @case("singular curvature", quick=True)
 def singular_curvature() -> Found:
     """The pole of a sphere, where u and v are no coordinates; a mesh whose texture has no area; a flat floor."""
+    import mitsuba as mi
+
     camera = PinholeCamera((0.0, 0.0, 3.0), (0.0, 0.0, 0.0), 0.2)
     ball = load_dict({"type": "scene", "ball": {"type": "sphere", "radius": 0.5, "bsdf": diffuse(0.5)}})
     frame = render_frame(

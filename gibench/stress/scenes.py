@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -53,6 +52,8 @@ def constant(radiance: float) -> dict[str, Any]:
 
 def rectangle(centre: ArrayLike, normal: ArrayLike, half: tuple[float, float], **more: Any) -> dict[str, Any]:
     """A rectangle of half sides `half` that faces along `normal`."""
+    import mitsuba as mi
+
     centre, normal = np.asarray(centre, dtype=float), np.asarray(normal, dtype=float)
     up = [0.0, 1.0, 0.0] if abs(normal[2]) > 0.5 else [0.0, 0.0, 1.0]
     place = mi.ScalarTransform4f().look_at(origin=centre.tolist(), target=(centre + normal).tolist(), up=up)
@@ -89,6 +90,8 @@ def closed_answer(reflectance: float, emitted: float, depth: int) -> float:
 
 def mesh(vertices: ArrayLike, faces: ArrayLike, **more: Any) -> Any:
     """A `mitsuba.Mesh` without normals of its own. vertices: (V, 3), metres. faces: (F, 3). more: bsdf, emitter."""
+    import mitsuba as mi
+
     corners, triangles = np.asarray(vertices, dtype=np.float32), np.asarray(faces, dtype=np.uint32)
     properties = mi.Properties()
     for name, plugin in more.items():

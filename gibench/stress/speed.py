@@ -10,8 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from gibench.generators.rooms import sample_room
-from gibench.generators.scene_files import write_room
 from gibench.metrics import reference_exposure, relmse
 from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.estimate import group_levels
@@ -48,6 +46,9 @@ DENOISED = SamplingCase("stratified, denoised", odd=False, denoise=True)
 
 def furnished_room() -> tuple[Scene, PinholeCamera]:
     """The first view of a generated room."""
+    from gibench.generators.rooms import sample_room
+    from gibench.generators.scene_files import write_room
+
     room = sample_room(0, ROOM, views=1)
     camera = room.cameras[0]
     with TemporaryDirectory() as folder:

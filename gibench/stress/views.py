@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
@@ -52,6 +51,8 @@ def render_path(
 
     max_depth: scattering events. rr_depth: from which on Russian roulette may end a path; by default it never does.
     """
+    import mitsuba as mi
+
     film = {
         "type": "hdrfilm",
         "width": resolution[0],
