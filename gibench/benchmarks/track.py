@@ -96,7 +96,8 @@ class Preset(_Strict):
     share. training, reference: keys of the recipe of either; references are rendered twice, and without `training`
     there is nothing to learn from. panoramas: of rooms, that light frames to train on too. training_rooms,
     training_seed: of a track that trains on rooms of their own. knobs: values for every method that has a knob of that
-    name, so that all share what is baked. methods: by id; a method that is not named runs at its defaults.
+    name, so that all share what is baked. methods: by id; a method that is not named runs at its defaults. variants:
+    whether those of methods run too where nobody says which methods do.
     """
 
     rooms: int = Field(ge=1)
@@ -112,6 +113,7 @@ class Preset(_Strict):
     budget: Budget
     knobs: dict[str, Value] = {}
     methods: dict[str, MethodPlan] = {}
+    variants: bool = True
 
     def plan(self, method: Method) -> MethodPlan:
         """Plan of this preset for a method."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -14,6 +14,7 @@ from gibench.errors import GibenchError
 
 if TYPE_CHECKING:
     from gibench.benchmarks.registry import Found
+    from gibench.benchmarks.track import Preset
 
 app = typer.Typer(
     help="Run, score and compare methods of real-time global illumination.", no_args_is_help=True
@@ -88,7 +89,7 @@ def run_track(
         if value is not None
     }
     chosen.preset(preset).recipe("reference", scenes=scenes)
-    found = _methods(methods, chosen.id, chosen.preset(preset).methods)
+    found = _methods(methods, chosen.id, chosen.preset(preset))
     overrides = parse_overrides(settings or (), {f.method.id: f.method for f in found})
     root = out or Path("results") / f"{chosen.id}-{preset}"
     given = {
@@ -236,7 +237,7 @@ def report(
     write_and_print(results, out, archive)
 
 
-def _methods(names: str | None, track: str, plans: dict[str, Any]) -> list[Found]:
+def _methods(names: str | None, track: str, preset: Preset) -> list[Found]:
     from gibench.benchmarks.errors import RegistryError, TrackError
     from gibench.benchmarks.registry import installed
     from gibench.cli.dataset import names_in
@@ -246,7 +247,7 @@ def _methods(names: str | None, track: str, plans: dict[str, Any]) -> list[Found
     if names is not None:
         return [registry.get(name) for name in dict.fromkeys(names_in(names, "--methods"))]
     known = [*registry.methods, *(broken.name for broken in registry.broken)]
-    for id in plans:
+    for id in preset.methods:
         if id not in known:
             raise TrackError(
                 f"track {track} has settings for method '{id}', which is not installed; {nearest(id, known)}"
@@ -256,7 +257,7 @@ def _methods(names: str | None, track: str, plans: dict[str, Any]) -> list[Found
     found = registry.on_track(track)
     if not found:
         raise RegistryError(f"no installed method runs on track {track}: pip install gibench brings its own")
-    return found
+    return [one for one in found if preset.variants or ":" not in one.method.id]
 
 
 def _seeds(text: str) -> tuple[int, ...]:

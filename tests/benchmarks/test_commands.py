@@ -1,5 +1,6 @@
 """`gibench bench …` as a user runs it, and what it says to every mistake."""
 
+import dataclasses
 import json
 import re
 import sys
@@ -7,9 +8,12 @@ from importlib.metadata import EntryPoint
 
 import pytest
 
+from gibench.baselines.method import Variant
 from gibench.benchmarks import registry
+from gibench.benchmarks.track import load_track
 from gibench.cli import run
 from gibench.cli.app import app
+from gibench.cli.bench import _methods
 from tests.benchmarks import toys
 from tests.benchmarks.conftest import TINY
 
@@ -189,3 +193,20 @@ def test_times_of_different_machines_are_not_compared(capsys, copy, results):
     said = capsys.readouterr().out
     assert said.count("times not compared: they are of different machines") == 6
     assert "prepared in" not in said
+
+
+def test_a_preset_may_leave_the_variants_of_methods_to_those_who_name_them(tmp_path, monkeypatch):
+    with_variant = dataclasses.replace(CONSTANT, variants=(Variant("other", {"shade": 0.25}),))
+    point = EntryPoint("constant", f"{__name__}:WITH_VARIANT", registry.GROUP)
+    monkeypatch.setattr(sys.modules[__name__], "WITH_VARIANT", with_variant, raising=False)
+    monkeypatch.setattr(registry, "installed", lambda: registry.registry_of([point]))
+    (tmp_path / "tiny.toml").write_text(toml(TINY))
+    track = load_track(str(tmp_path / "tiny.toml"))
+    preset = next(iter(track.presets.values()))
+    for names, variants, expected in (
+        (None, True, ["constant", "constant:other"]),
+        (None, False, ["constant"]),
+        ("constant:other", False, ["constant:other"]),
+    ):
+        found = _methods(names, track.id, preset.model_copy(update={"methods": {}, "variants": variants}))
+        assert [one.method.id for one in found] == expected
