@@ -12,9 +12,12 @@ from tests import blas
 # Read when torch is loaded: threads that wait asleep, since those that spin starve whatever else runs.
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
-# A shell that runs the tests in the background has Ctrl-C ignored, by them and by all that they start.
+# A shell that runs the tests in the background has Ctrl-C ignored, by them and by all that they start, and nohup has
+# the end of a terminal ignored.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -99,7 +99,8 @@ class _Tasks:
     ) -> None:
         self.client, self.work, self.listener, self.token = client, work, listener, token
         self.accepts = accepts
-        self.heard: queue.SimpleQueue[tuple[int, str, str, Any]] = queue.SimpleQueue()
+        # Not SimpleQueue: where a timeout has passed by the time that it looks again, it waits for ever (CPython 3.11).
+        self.heard: queue.Queue[tuple[int, str, str, Any]] = queue.Queue()
         self.tries: dict[int, str] = {}
         self.begun: Counter[int] = Counter()
         self.hosts: dict[str, str] = {}
@@ -109,6 +110,7 @@ class _Tasks:
         self.places: dict[int, set[str]] = {}
         self.last_seen = time.monotonic()
         self.all_are_able = True
+        self.scheduler: str | None = None
 
     def prepare(self) -> None:
         """Make all workers that are there ready. Raises ClusterError with the address of one that cannot be used."""
@@ -226,8 +228,13 @@ class _Tasks:
         """Addresses of the workers. Raises OSError or TimeoutError where the scheduler is gone."""
         if self.client.status != "running":
             raise OSError("the scheduler is gone")
-        answer = self.client.sync(self.client.scheduler.ncores, callback_timeout=opening.PATIENCE / 4)
-        return list(answer)
+        limit = opening.PATIENCE / 4
+        scheduler = self.client.sync(self.client.scheduler.identity, n_workers=0, callback_timeout=limit)["id"]
+        if self.scheduler not in (None, scheduler):
+            # The client found it by itself. It knows neither our tasks nor what its workers must bring.
+            raise OSError("another scheduler has taken the place of ours")
+        self.scheduler = scheduler
+        return list(self.client.sync(self.client.scheduler.ncores, callback_timeout=limit))
 
     def _hand_out(self, number: int, able: list[str]) -> None:
         job, name = self.work.job, self.work.place(number)
@@ -256,7 +263,7 @@ class _Tasks:
             waited = LISTEN_SECONDS
             while True:
                 number, attempt, kind, content = self.heard.get(timeout=waited)
-                waited = 1e-6
+                waited = 0.0
                 if self.tries.get(number) == DONE:
                     continue
                 if self.tries.get(number, attempt) != attempt:

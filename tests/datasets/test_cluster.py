@@ -118,7 +118,9 @@ def test_a_worker_that_hangs_is_given_up_and_its_room_made_by_another(tmp_path, 
     assert frames_of(root) == made_locally(tmp_path / "local", 4)
 
 
-def test_a_scheduler_that_is_killed_and_started_again(tmp_path):
+@pytest.mark.parametrize("noticed", [False, True])
+def test_a_scheduler_that_is_killed_and_started_again(tmp_path, noticed):
+    """noticed: before the run looks again, Dask's client has found the new one by itself, and waits for nothing."""
     file, root = tmp_path / "scheduler.json", tmp_path / "d"
     first = scheduler(file)
     port = int(file.read_text().split("tcp://127.0.0.1:")[1].split('"')[0])
@@ -130,6 +132,7 @@ def test_a_scheduler_that_is_killed_and_started_again(tmp_path):
         if progress.rooms_done == 2 and not replaced:
             killed(first, worker)
             replaced.extend([scheduler(file, port), dask(*words)])
+            time.sleep(5.0 if noticed else 0.0)
 
     try:
         work = fake_work(root, tiny(6), slow=0.05)
