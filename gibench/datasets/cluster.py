@@ -229,7 +229,9 @@ class _Tasks:
         if self.client.status != "running":
             raise OSError("the scheduler is gone")
         limit = opening.PATIENCE / 4
-        scheduler = self.client.sync(self.client.scheduler.identity, n_workers=0, callback_timeout=limit)["id"]
+        scheduler = self.client.sync(self.client.scheduler.identity, n_workers=0, callback_timeout=limit)[
+            "id"
+        ]
         if self.scheduler not in (None, scheduler):
             # The client found it by itself. It knows neither our tasks nor what its workers must bring.
             raise OSError("another scheduler has taken the place of ours")
