@@ -54,7 +54,7 @@ def command_lines(page: str) -> list[list[str]]:
 def commands_of(program: str) -> list[list[str]]:
     pages = ("README.md", "docs/datasets.md", "docs/rooms.md", "docs/cluster.md")
     asked = [words for page in pages for words in command_lines(page) if words[0] == program]
-    return [words for words in asked if words[:3] != ["gibench", "bench", "run"]]
+    return [words for words in asked if "--cluster" not in words]
 
 
 def started(words: list[str], folder: Path) -> subprocess.CompletedProcess[str]:

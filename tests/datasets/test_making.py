@@ -1,5 +1,6 @@
 """Making with a renderer that takes no time; `test_real_dataset` does it with the real one."""
 
+import dataclasses
 import errno
 import hashlib
 import json
@@ -272,18 +273,10 @@ def test_workers_are_replaced_after_a_number_of_rooms(tmp_path, monkeypatch):
     hired = []
     original = pool._start_worker
     monkeypatch.setattr(pool, "_start_worker", lambda work: hired.append(original(work)) or hired[-1])
-    monkeypatch.setattr(pool, "ROOMS_PER_WORKER", 2)
-    monkeypatch.setattr(pool._Worker, "__init__", _with_two_rooms(pool._Worker.__init__))
-    make_fake(tmp_path / "d", tiny(5, views=1))
+    root, recipe = tmp_path / "d", tiny(5, views=1)
+    make_fake(root, recipe, work=dataclasses.replace(fake_work(root, recipe), rooms_per_worker=2))
     assert len(hired) == 3
     assert all(not worker.process.is_alive() for worker in hired)
-
-
-def _with_two_rooms(original):
-    def init(self, process, connection):
-        original(self, process, connection, rooms_left=2)
-
-    return init
 
 
 SLOW_RUN = """

@@ -154,7 +154,7 @@ class Predicting(Learner):
         self.network.begin_at(torch.stack([one.code.mean(dim=(1, 2)) for one in judged]).mean(dim=0))
         self.network.to(device)
         self.held_out = [Example(*(part.to(device) for part in one)) for one in judged]
-        self.judge = Lpips().to(device) if plan.lpips else None
+        self.lpips = Lpips().to(device) if plan.lpips else None
         optimiser = torch.optim.Adam(self.network.parameters(), lr=RATES[plan.network])
         super().__init__({"network": self.network}, {"network": optimiser})
 
@@ -185,8 +185,8 @@ class Predicting(Learner):
         if self._looks(now, code):
             window = random_window(code.shape[-2:], PERCEPTUAL_SIDE, now.random)
             images = [displayed(window.of(CODE.decode(part) * shown + rest), 1.0) for part in (output, code)]
-            assert self.judge is not None
-            losses["lpips"] = self.judge(*images)
+            assert self.lpips is not None
+            losses["lpips"] = self.lpips(*images)
             loss = loss + PERCEPTUAL_EVERY * PERCEPTUAL * losses["lpips"]
         self.descend("network", loss, largest_gradient=LARGEST_GRADIENT)
         return {name: value.detach() for name, value in losses.items()}
@@ -194,7 +194,7 @@ class Predicting(Learner):
     def _looks(self, now: Step, code: Tensor) -> bool:
         """Whether this step has LPIPS in its loss."""
         due = now.progress >= PERCEPTUAL_FROM and now.number % PERCEPTUAL_EVERY == 0
-        return self.judge is not None and due and min(code.shape[-2:]) >= SMALLEST
+        return self.lpips is not None and due and min(code.shape[-2:]) >= SMALLEST
 
 
 def facts_of(kept: Mapping[str, Any]) -> Measure:

@@ -71,7 +71,7 @@ def test_it_begins_smooth_at_the_mean_light():
 
 def test_the_perceptual_loss_comes_at_the_end():
     one = learner()
-    assert one.judge is not None
+    assert one.lpips is not None
     code = one.held_out[0].code[None]
     looks = [one._looks(Step(n, n / 40, random_of_step(0, n)), code) for n in range(40)]
     assert [n for n, look in enumerate(looks) if look] == [32, 36]

@@ -50,7 +50,7 @@ def test_probabilities_are_positive_and_sum_to_one():
     lights = np.array(guide._light_probability).reshape(len(density), -1)
     np.testing.assert_allclose(lights.sum(axis=1), 1, rtol=1e-5)
     assert lights.min() > 0
-    share = np.array(guide._share)
+    share = np.array(guide._fraction)
     assert share[0] == 0
     assert ((share >= 0) & (share < 1)).all()
 
