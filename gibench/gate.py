@@ -100,6 +100,13 @@ def real_folder(path: Path) -> bool:
         return False
 
 
+def own_leftovers(folder: Path, pattern: str) -> list[Path]:
+    """Paths in a folder whose names match a pattern; none where the folder is a link."""
+    if not real_folder(folder):
+        return []
+    return [entry for entry in folder.iterdir() if re.fullmatch(pattern, entry.name)]
+
+
 def taken(path: Path) -> bool:
     """Whether anything lies there that is no real folder: a link, even one that leads nowhere, or a file."""
     return os.path.lexists(path) and not real_folder(path)

@@ -25,7 +25,6 @@ from gibench.baselines.stages import synchronise
 from gibench.baselines.training_set import TrainingSet
 from gibench.datasets.checked import Amount, Checked, Count, parsed
 from gibench.datasets.files import as_json, process_number, sync_tree
-from gibench.datasets.folder import own_leftovers
 
 RECORD = "bake.json"
 
@@ -189,7 +188,7 @@ def _held(partial: Path) -> Iterator[Path]:
 
 def remove_abandoned(root: Path) -> None:
     """Remove half-made bakes whose process is dead. Those that a living one is making stay, and so do links."""
-    for partial in own_leftovers(root, rf"{NAME}{re.escape(PARTIAL)}[0-9]+"):
+    for partial in gate.own_leftovers(root, rf"{NAME}{re.escape(PARTIAL)}[0-9]+"):
         with suppress(OSError):  # no folder, not ours, gone by now, or held
             descriptor = os.open(partial, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
             try:
@@ -197,7 +196,9 @@ def remove_abandoned(root: Path) -> None:
                 shutil.rmtree(partial)
             finally:
                 os.close(descriptor)
-    for beside in own_leftovers(root, rf"{NAME}\.checkpoint\.[0-9]+"):  # checkpoints that were being written
+    for beside in gate.own_leftovers(
+        root, rf"{NAME}\.checkpoint\.[0-9]+"
+    ):  # checkpoints that were being written
         stem, process = beside.name.split(".checkpoint.")
         if not (root / f"{stem}{PARTIAL}{process}").exists():
             beside.unlink(missing_ok=True)

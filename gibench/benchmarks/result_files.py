@@ -36,7 +36,6 @@ from gibench.datasets.errors import FolderError
 from gibench.datasets.files import as_json, process_number, sync_folder, write_whole
 from gibench.datasets.folder import (
     lock_folder,
-    own_leftovers,
     refuse_links,
     remove_empty,
     remove_tokens,
@@ -156,15 +155,15 @@ class RunFolder:
         Nothing goes but what carries a result's or a file's own names, and nothing behind a link.
         """
         remove_tokens(self.root)
-        for left in own_leftovers(self.results, rf"\.{ID}\.partial(-[0-9]+)?"):
+        for left in gate.own_leftovers(self.results, rf"\.{ID}\.partial(-[0-9]+)?"):
             remove_frames(left)
-        for left in own_leftovers(self.results, ID):  # its frames came, its record did not
+        for left in gate.own_leftovers(self.results, ID):  # its frames came, its record did not
             if not os.path.lexists(self.result_file(left.name)):
                 remove_frames(left)
-        for scene in own_leftovers(self.root / "bakes", r"[^/.][^/]*"):
+        for scene in gate.own_leftovers(self.root / "bakes", r"[^/.][^/]*"):
             remove_abandoned(scene)
         for place in (self.root.resolve(), self.results, self.scores):
-            for left in own_leftovers(place, r"\.[^/]+\.json\.partial-[0-9]+"):
+            for left in gate.own_leftovers(place, r"\.[^/]+\.json\.partial-[0-9]+"):
                 if not gate.real_folder(left):
                     left.unlink(missing_ok=True)
 
@@ -249,7 +248,7 @@ class RunFolder:
 
 def remove_frames(folder: Path) -> None:
     """Remove the frames of a result and their folder; anything else in it stays, and so does the folder then."""
-    for frame in own_leftovers(folder, r"[0-9]{4,}\.exr"):
+    for frame in gate.own_leftovers(folder, r"[0-9]{4,}\.exr"):
         if not gate.real_folder(frame):
             frame.unlink(missing_ok=True)
     with suppress(OSError):

@@ -30,7 +30,7 @@ from gibench.datasets.checked import Checked, Count, Sha256, parsed
 from gibench.datasets.errors import DatasetError, FolderError, MakingError
 from gibench.datasets.exr import decode
 from gibench.datasets.files import as_json, sync_folder, through_no_link, write_whole
-from gibench.datasets.folder import CACHE, claimed, own_leftovers
+from gibench.datasets.folder import CACHE, claimed
 from gibench.rendering.channels import CHANNELS
 
 if TYPE_CHECKING:
@@ -371,5 +371,5 @@ def _remove_arrays(folder: Path) -> None:
 
 
 def _remove_partials(folder: Path) -> None:
-    for left in own_leftovers(folder, r"\.[a-z0-9_.]+\.partial-[0-9]+"):
+    for left in gate.own_leftovers(folder, r"\.[a-z0-9_.]+\.partial-[0-9]+"):
         left.unlink(missing_ok=True)

@@ -54,38 +54,31 @@ def remove_partials(root: Path, room: int | None = None) -> None:
     wait for the next run.
     """
     stem = "[0-9]{6,}" if room is None else f"{room:06d}"
-    for left in own_leftovers(root / "rooms", rf"\.{stem}\.partial-[0-9]+"):
+    for left in gate.own_leftovers(root / "rooms", rf"\.{stem}\.partial-[0-9]+"):
         if gate.real_folder(left):
             keep_frames(root, int(left.name[1:].partition(".")[0]), left)
     if room is None:
-        for left in own_leftovers(root / ENVIRONMENTS, r"\.[0-9a-f]{64}\.exr\.partial-[0-9]+"):
+        for left in gate.own_leftovers(root / ENVIRONMENTS, r"\.[0-9a-f]{64}\.exr\.partial-[0-9]+"):
             left.unlink(missing_ok=True)
         remove_tokens(root)
         names = "|".join(map(re.escape, (MANIFEST, TABLE, PREVIEW, CARD)))
-        for left in own_leftovers(root.resolve(), rf"\.({names})\.partial-[0-9]+"):
+        for left in gate.own_leftovers(root.resolve(), rf"\.({names})\.partial-[0-9]+"):
             if not gate.real_folder(left):
                 left.unlink(missing_ok=True)
 
 
 def remove_tokens(root: Path) -> None:
     """Remove what killed runs on clusters left, so that workers which still do their tasks stop."""
-    for left in own_leftovers(root.resolve(), rf"{re.escape(TOKEN)}[0-9a-f]{{16}}\.partial-[0-9]+"):
+    for left in gate.own_leftovers(root.resolve(), rf"{re.escape(TOKEN)}[0-9a-f]{{16}}\.partial-[0-9]+"):
         if not gate.real_folder(left):
             left.unlink(missing_ok=True)
-
-
-def own_leftovers(folder: Path, pattern: str) -> list[Path]:
-    """Paths in a folder whose names match a pattern; none where the folder is a link."""
-    if not gate.real_folder(folder):
-        return []
-    return [entry for entry in folder.iterdir() if re.fullmatch(pattern, entry.name)]
 
 
 def remove_empty_dataset(root: Path) -> None:
     """Remove what a dataset without any whole room consists of. Only for the holder of the lock."""
     for name in (MANIFEST, TABLE, PREVIEW, CARD):
         (root / name).unlink(missing_ok=True)
-    for panorama in own_leftovers(root / ENVIRONMENTS, r"[0-9a-f]{64}\.exr"):
+    for panorama in gate.own_leftovers(root / ENVIRONMENTS, r"[0-9a-f]{64}\.exr"):
         panorama.unlink()
     remove_empty([root / ENVIRONMENTS, root / "rooms"])
 

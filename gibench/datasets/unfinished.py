@@ -9,20 +9,20 @@ from __future__ import annotations
 
 import hashlib
 import json
-import re
 import shutil
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from gibench import gate
+from gibench.datasets.checked import parsed
+from gibench.datasets.records import FrameRecord
 
 JOURNAL = "frames.jsonl"
 
 WORTH_KEEPING = 60.0
 """Seconds of rendering below which the frames of an unfinished room are rendered again: nobody misses them."""
-
-FRAME = re.compile(r"frames/[0-9]{4,9}\.exr")
 
 
 def unfinished_folder(root: Path, room: int) -> Path:
@@ -36,17 +36,16 @@ def write_down(folder: Path, record: Mapping[str, Any]) -> None:
         journal.write(json.dumps(record, allow_nan=False) + "\n")
 
 
-def keep_frames(root: Path, room: int, partial: Path, *, worth: float | None = None) -> None:
+def keep_frames(root: Path, room: int, partial: Path) -> None:
     """Move the frames of a room that was not finished to where the next run finds them; the rest is removed.
 
-    worth: seconds of rendering from which on they are kept, `WORTH_KEEPING` by default. Never raises OSError: what
-    cannot be kept is rendered again.
+    Never raises OSError: what cannot be kept is rendered again.
     """
     try:
         waiting = unfinished_folder(root, room)
         before, now = _journal(waiting), _journal(partial)
         seconds = sum(record["seconds"] for record in (before | now).values())
-        if now and seconds >= (WORTH_KEEPING if worth is None else worth) and not waiting.is_symlink():
+        if now and seconds >= WORTH_KEEPING and not waiting.is_symlink():
             (waiting / "frames").mkdir(parents=True, exist_ok=True)
             for record in now.values():
                 _move(partial, waiting, record)
@@ -92,10 +91,8 @@ def forget_frames(root: Path, room: int) -> None:
 
 def unfinished_rooms(root: Path) -> dict[int, int]:
     """How many frames wait for each room that has some."""
-    if not gate.real_folder(root / "rooms"):
-        return {}
-    names = (re.fullmatch(r"\.([0-9]{6,9})\.unfinished", entry.name) for entry in (root / "rooms").iterdir())
-    counts = {int(name[1]): len(_journal(unfinished_folder(root, int(name[1])))) for name in names if name}
+    folders = gate.own_leftovers(root / "rooms", r"\.[0-9]{6,9}\.unfinished")
+    counts = {int(folder.name.split(".")[1]): len(_journal(folder)) for folder in folders}
     return {room: count for room, count in sorted(counts.items()) if count}
 
 
@@ -114,22 +111,8 @@ def _journal(folder: Path) -> dict[int, dict[str, Any]]:
         return {}
     found: dict[int, dict[str, Any]] = {}
     for line in lines:
-        try:
-            record = json.loads(line)
-        except ValueError:
-            continue
-        if _is_record(record) and (folder / record["file"]).is_file():
-            found[record["view"]] = record
+        with suppress(ValueError):
+            record = parsed(line.encode(), FrameRecord)
+            if (folder / record["file"]).is_file():
+                found[record["view"]] = record
     return found
-
-
-def _is_record(record: Any) -> bool:
-    return (
-        isinstance(record, dict)
-        and type(record.get("view")) is int
-        and isinstance(record.get("file"), str)
-        and FRAME.fullmatch(record["file"]) is not None
-        and isinstance(record.get("sha256"), str)
-        and type(record.get("bytes")) is int
-        and isinstance(record.get("seconds"), float)
-    )
