@@ -9,7 +9,8 @@ from __future__ import annotations
 import difflib
 import importlib
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -38,6 +39,16 @@ MAX_DEPTH = 8
 
 class MethodError(GibenchError):
     """A method that is asked for what it does not have, or that cannot do what it promises."""
+
+
+@contextmanager
+def reading(what: str, folder: Path) -> Iterator[None]:
+    """Read what a training left, `what` for people. Raises MethodError that names the folder for all that fails."""
+    try:
+        yield
+    except (GibenchError, OSError, RuntimeError, LookupError, ValueError, TypeError) as problem:
+        first = next(iter(str(problem).splitlines()), type(problem).__name__)
+        raise MethodError(f"{what} in {folder} cannot be read ({first}): remove that folder") from problem
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gibench.baselines.direct_light.tracer import DirectLight
-from gibench.baselines.method import MethodError, Prediction, Site, Training, View
+from gibench.baselines.method import MethodError, Prediction, Site, Training, View, reading
 from gibench.baselines.stages import Stages
 
 CONSTANT = "ambient.json"
@@ -64,12 +64,8 @@ class AmbientLight(DirectLight):
 
 
 def _read(folder: Path) -> NDArray[np.float64]:
-    try:
+    with reading("the constant", folder):
         constant = np.array(json.loads((folder / CONSTANT).read_text(encoding="utf-8")), dtype=np.float64)
-    except (OSError, ValueError, TypeError) as problem:
-        raise MethodError(
-            f"the constant in {folder} cannot be read ({problem}): remove that folder"
-        ) from None
     if constant.shape != (3,) or not np.isfinite(constant).all():
         raise MethodError(f"the constant in {folder} is not three numbers: remove that folder")
     return constant

@@ -20,14 +20,13 @@ from torch import Tensor
 from gibench.baselines.efficient_light_probes import losses
 from gibench.baselines.efficient_light_probes.examples import Example
 from gibench.baselines.efficient_light_probes.network import ReconstructionNetwork, Scale
-from gibench.baselines.method import MethodError, Setting, Site
+from gibench.baselines.method import Setting, Site, reading
 from gibench.baselines.sources import digest
 from gibench.baselines.training import artifacts
 from gibench.baselines.training.budget import LOOKS, Budget
 from gibench.baselines.training.checkpoints import Checkpoint
 from gibench.baselines.training.crops import Window, random_window
 from gibench.baselines.training.curves import Trained
-from gibench.baselines.training.errors import CheckpointError
 from gibench.baselines.training.learner import Learner, Step
 from gibench.baselines.training.loop import train
 from gibench.baselines.training.losses.pixels import absolute
@@ -125,17 +124,12 @@ def trained_network(
 
 
 def _read(folder: Path, fusion: str) -> Network:
-    try:
+    with reading("the trained network", folder):
         weights, facts = artifacts.kept(folder)
         network = ReconstructionNetwork(fusion)
         network.load_state_dict(weights["network"])
         scale = Scale(float(facts["exposure"]), float(facts["depth"]))
         return Network(network, scale, int(facts["epoch"]))
-    except (CheckpointError, RuntimeError, KeyError) as problem:
-        first = str(problem).splitlines()[0]
-        raise MethodError(
-            f"the trained network in {folder} cannot be read ({first}): remove that folder"
-        ) from problem
 
 
 def scale_of(examples: Sequence[Example]) -> Scale:

@@ -14,13 +14,12 @@ from gibench.baselines.image_to_image.examples import READ, Examples
 from gibench.baselines.image_to_image.frames import Frames, held_out
 from gibench.baselines.image_to_image.learner import EPOCHS, IndirectLight, Plan
 from gibench.baselines.image_to_image.shading import CHANNELS, geometry, indirect
-from gibench.baselines.method import MethodError, Prediction, Setting, Site, Training, View
+from gibench.baselines.method import MethodError, Prediction, Setting, Site, Training, View, reading
 from gibench.baselines.sources import digest
 from gibench.baselines.stages import Stages
 from gibench.baselines.training import artifacts
 from gibench.baselines.training.budget import Budget
 from gibench.baselines.training.checkpoints import Checkpoint
-from gibench.baselines.training.errors import CheckpointError
 from gibench.baselines.training.loop import train
 from gibench.baselines.training.reproducible import seeded
 from gibench.rendering.backend import torch_device
@@ -74,13 +73,8 @@ class IndirectByNetwork(DirectLight):
         if site.weights is None:
             raise MethodError("the network has not been trained: it needs the folder that `train` filled")
         network = self.network()
-        try:
+        with reading("the trained network", site.weights):
             network.load_state_dict(artifacts.kept(site.weights)[0]["network"])
-        except (CheckpointError, RuntimeError, KeyError) as problem:
-            first = str(problem).splitlines()[0]
-            raise MethodError(
-                f"the trained network in {site.weights} cannot be read ({first}): remove that folder"
-            ) from problem
         self.parameters = sum(one.numel() for one in network.parameters())
         self._network = network.eval().requires_grad_(False).to(torch_device())
         self._surfaces = DeviceFrames(site.scene, [name for name in CHANNELS if name != "direct_diffuse"])
