@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
 from gibench import gate
-from gibench.datasets.checked import Checked, parsed, shown
+from gibench.datasets.checked import parsed, shown
 from gibench.datasets.exr import decode, present_channels
 from gibench.datasets.folder import room_folder
 from gibench.datasets.manifest import room_record
+from gibench.datasets.records import Contents
 from gibench.rendering.channels import CHANNELS, PARTS
 
 if TYPE_CHECKING:
@@ -36,33 +36,6 @@ NEAR_MIRROR = 0.1
 """GGX alpha below which a surface counts as one."""
 
 READ = (*PARTS, "depth", "roughness", "specular_albedo", "material_id")
-
-
-class Lamp(Checked):
-    """A light of a room; those of scene files say neither."""
-
-    lumens: float | None = None
-    kelvin: float | None = None
-
-
-class Family(Checked):
-    """A material of a room."""
-
-    family: str
-
-
-class Outside(Checked):
-    """What lies outside the windows."""
-
-    kind: str
-
-
-class Described(Checked):
-    """What a card is told by a room.json."""
-
-    lights: list[Lamp] = Field(default_factory=list)
-    materials: dict[str, Family] = Field(default_factory=dict)
-    environment: Outside | None = None
 
 
 def card(root: Path, manifest: Mapping[str, Any], table: pd.DataFrame) -> str:
@@ -166,7 +139,7 @@ def _statistics(root: Path, table: pd.DataFrame) -> str:
 def _described(root: Path, room: int) -> dict[str, Any]:
     path = (room_folder(root, room) / "room.json").relative_to(root)
     with suppress(gate.GateError, ValueError):
-        return parsed(gate.read_inside(root, path), Described)
+        return parsed(gate.read_inside(root, path), Contents)
     return {}
 
 

@@ -176,3 +176,30 @@ class Polished(Checked):
     """`room.json` of a generated room, as far as `gibench dataset info` tells of its gloss."""
 
     parameters: Shine
+
+
+class Lamp(Checked):
+    """A light of a room; those of scene files say neither."""
+
+    lumens: float | None = None
+    kelvin: float | None = None
+
+
+class Family(Checked):
+    """A material of a room."""
+
+    family: str
+
+
+class Outside(Checked):
+    """The environment outside the windows."""
+
+    kind: str
+
+
+class Contents(Checked):
+    """`room.json` of any room, as far as the card of a dataset tells of it."""
+
+    lights: list[Lamp] = Field(default_factory=list)
+    materials: dict[str, Family] = Field(default_factory=dict)
+    environment: Outside | None = None

@@ -26,7 +26,7 @@ KNOBS = (
     ),
     Knob("batch", 1, (1, 2, 4, 8), "frames that a step sees", trains=True),
     Knob("perceptual", True, (False, True), "whether the perceptual loss is trained for", trains=True),
-    Knob("adversarial", True, (False, True), "whether a judge learns along", trains=True),
+    Knob("adversarial", True, (False, True), "whether a discriminator learns along", trains=True),
     *SAMPLING,
 )
 

@@ -1,4 +1,4 @@
-"""How a network learns indirect light: content, perception and a judge (Gai, Wang & Li, section 3.4)."""
+"""Training a network of indirect light: content, perception and a discriminator (Gai, Wang & Li, section 3.4)."""
 
 from __future__ import annotations
 
@@ -27,8 +27,10 @@ from gibench.baselines.training.schedule import half_cosine, set_rate
 CONTENT, PERCEPTUAL, ADVERSARIAL = 0.7, 0.28, 0.02
 """Weights of the losses, ω (section 3.4)."""
 
-RATE, JUDGE_RATE, JUDGE_BETA = 1e-3, 2e-4, 0.5
-"""Of Adam for the network, which falls along half a cosine to nothing, and of Adam for the judge, with its β₁."""
+RATE, DISCRIMINATOR_RATE, DISCRIMINATOR_BETA = 1e-3, 2e-4, 0.5
+"""Of Adam for the network, which falls along half a cosine to nothing, and of Adam for the discriminator, with
+its β₁.
+"""
 
 LARGEST_GRADIENT = 1.0
 """Norm that gradients of the network are cut down to."""
@@ -69,7 +71,7 @@ class Plan:
 
 
 class IndirectLight(Learner):
-    """A network of `shading.indirect`, and a judge of single colours that learns along."""
+    """A network of `shading.indirect`, and a discriminator of single colours that learns along."""
 
     def __init__(self, network: nn.Module, learned: Examples, held_out: Examples, plan: Plan) -> None:
         """network: on its device."""
@@ -86,7 +88,7 @@ class IndirectLight(Learner):
                 discriminator = PatchGan(LIGHT + 1).to(device)
             networks["judge"] = discriminator
             optimisers["judge"] = torch.optim.Adam(
-                discriminator.parameters(), lr=JUDGE_RATE, betas=(JUDGE_BETA, 0.999)
+                discriminator.parameters(), lr=DISCRIMINATOR_RATE, betas=(DISCRIMINATOR_BETA, 0.999)
             )
         self.features = Vgg16Features().to(device) if plan.perceptual else None
         super().__init__(networks, optimisers, product=["network"])
@@ -107,7 +109,7 @@ class IndirectLight(Learner):
         return torch.stack(errors).mean()
 
     def step(self, batch: Any, now: Step) -> dict[str, Tensor]:
-        """Down equation 6."""
+        """A step of both optimisers down equation 6."""
         batch = _on(batch, self.device)
         set_rate(self.optimisers["network"], RATE * half_cosine(now.progress))
         inputs = Inputs.of(batch["direct"], batch["albedo"], batch["geometry"], batch["unit"])

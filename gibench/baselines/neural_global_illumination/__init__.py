@@ -4,6 +4,19 @@ from __future__ import annotations
 
 from gibench.baselines.linearly_transformed_cosines import SHADOWS
 from gibench.baselines.method import Knob, Method, Variant
+from gibench.rendering.channels import CUES
+
+SURFACE = (
+    "position",
+    "normal",
+    "albedo",
+    "specular_albedo",
+    "roughness",
+    "reflected_position",
+    "reflected_normal",
+    "reflected_albedo",
+)
+"""Channels of what is seen, that the network is given."""
 
 METHOD = Method(
     id="ngi",
@@ -19,18 +32,8 @@ METHOD = Method(
         "direct_specular",
         "indirect_diffuse",
         "indirect_specular",
-        "position",
-        "normal",
-        "albedo",
-        "specular_albedo",
-        "roughness",
-        "reflected_position",
-        "reflected_normal",
-        "reflected_albedo",
-        "radiance_cue_0",
-        "radiance_cue_1",
-        "radiance_cue_2",
-        "radiance_cue_3",
+        *SURFACE,
+        *CUES,
     ),
     knobs=(
         Knob(

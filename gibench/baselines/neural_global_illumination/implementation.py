@@ -10,9 +10,9 @@ import torch
 from gibench.baselines.image_to_image.device_frames import DeviceFrames, as_image, torch_device
 from gibench.baselines.image_to_image.frames import Frames, held_out
 from gibench.baselines.linearly_transformed_cosines.implementation import RectangleLight, area_light
-from gibench.baselines.method import MethodError, Prediction, Setting, Site, Training, View
-from gibench.baselines.neural_global_illumination import METHOD
-from gibench.baselines.neural_global_illumination.inputs import CODE, SURFACE, Measure, assembled
+from gibench.baselines.method import MethodError, Prediction, Setting, Site, Training, View, reading
+from gibench.baselines.neural_global_illumination import METHOD, SURFACE
+from gibench.baselines.neural_global_illumination.inputs import CODE, Measure, assembled
 from gibench.baselines.neural_global_illumination.network import NeuralGlobalIllumination
 from gibench.baselines.neural_global_illumination.training import (
     Examples,
@@ -26,7 +26,6 @@ from gibench.baselines.sources import digest
 from gibench.baselines.stages import Stages
 from gibench.baselines.training import artifacts
 from gibench.baselines.training.checkpoints import Checkpoint
-from gibench.baselines.training.errors import CheckpointError
 
 HELD_OUT, JUDGED = 0.05, 8
 """Share of the training frames that is held out, and how many of these are looked at."""
@@ -78,15 +77,10 @@ class NeuralLight:
         if site.weights is None:
             raise MethodError("ngi has not been trained: it needs the folder that `train` filled")
         self.network = NeuralGlobalIllumination(size_of(self.settings))
-        try:
+        with reading("the trained network", site.weights):
             weights, facts = artifacts.kept(site.weights)
             self.network.load_state_dict(weights["network"])
             self.measure: Measure = facts_of(facts)
-        except (CheckpointError, RuntimeError, KeyError, ValueError, TypeError) as problem:
-            first = str(problem).splitlines()[0]
-            raise MethodError(
-                f"the trained network in {site.weights} cannot be read ({first}): remove that folder"
-            ) from problem
         self.network.eval().requires_grad_(False).to(torch_device())
         self._light = RectangleLight(site.scene, cues=self._lighting == "all")
         self._surfaces = DeviceFrames(site.scene, SURFACE)

@@ -20,18 +20,6 @@ from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.channels import CUES
 from gibench.rendering.lighting import AreaLight
 
-SURFACE = (
-    "position",
-    "normal",
-    "albedo",
-    "specular_albedo",
-    "roughness",
-    "reflected_position",
-    "reflected_normal",
-    "reflected_albedo",
-)
-"""Channels of what is seen."""
-
 LIGHT = ("direct_diffuse", "direct_specular", *CUES)
 """Channels of direct light."""
 

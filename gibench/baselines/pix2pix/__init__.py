@@ -1,4 +1,4 @@
-"""pix2pix (Isola et al. 2017): images to images by a U-Net, with a judge."""
+"""pix2pix (Isola et al. 2017): images to images by a U-Net, with a discriminator."""
 
 from gibench.baselines.image_to_image import CHANNELS, KNOBS
 from gibench.baselines.method import Method
