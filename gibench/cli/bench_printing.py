@@ -70,8 +70,7 @@ def print_run(root: Path, report: Report) -> None:
     text = f"{duration(seconds['total'])}: {parts}"
     if report.workers:
         text += f"; preparing and rendering summed over {report.workers} workers"
-    for number, line in enumerate(textwrap.wrap(text, 80 - 14)):
-        _row("time" if number == 0 else "", line)
+    _rows("time", text)
     if report.workers:
         return
     share = 100 * seconds["harness"] / max(seconds["total"], 1e-9)
@@ -85,12 +84,14 @@ def remark(text: str) -> None:
 
 def print_scored(scored: Scored) -> None:
     """Say which metrics could not be computed, and why."""
-    for name, (why, count) in scored.skipped.items():
-        _row("left out", f"{name} of {count} results: {why}")
-    for name, count in scored.clipped.items():
-        _row(
-            "noise", f"{count} values of {name} came out below 0, as those of good images may, and stand as 0"
-        )
+    alike: dict[tuple[str, int], list[str]] = {}
+    for name, reason in scored.skipped.items():
+        alike.setdefault(reason, []).append(name)
+    for (why, count), names in alike.items():
+        _rows("left out", f"{', '.join(names)} of {count} results: {why}")
+    if scored.clipped:
+        counts = ", ".join(f"{name} ({count})" for name, count in scored.clipped.items())
+        _rows("noise", f"estimates below 0, as those of good images may be, stand as no error: {counts}")
     for problem in scored.problems:
         say(problem, err=True)
 
@@ -105,7 +106,7 @@ def print_equal_time(root: Path, milliseconds: float) -> None:
                 for value, ms in entry["tried"].items()
             )
             met = entry["label"] or f"{entry['method']}: no setting meets it"
-            _row(f"≤ {milliseconds:g} ms", f"{met} (measured {tried.strip()})")
+            _rows(f"≤ {milliseconds:g} ms", f"{met} (measured {tried.strip()})")
 
 
 def print_board(root: Path) -> None:
@@ -278,3 +279,9 @@ def _cut(text: str, width: int) -> str:
 
 def _row(name: str, value: str) -> None:
     say(f"{name:<14}{one_line(value)}")
+
+
+def _rows(name: str, text: str) -> None:
+    """A row that goes on in the next lines where it is longer than 80 columns."""
+    for number, line in enumerate(textwrap.wrap(text, 80 - 14)):
+        _row(name if number == 0 else "", line)
