@@ -32,7 +32,7 @@ STRIPS: dict[str, dict[str, Any]] = {
 """Materials of the floor, from left to right: those that rooms have."""
 
 
-def strips_rig() -> LightRig:
+def strips_rig(*, panoramas: bool = False) -> LightRig:
     width = 3.0 / len(STRIPS)
     parts = {
         name.replace(" ", "_"): scenes.rectangle(
@@ -47,4 +47,4 @@ def strips_rig() -> LightRig:
         "to_world": mi.ScalarTransform4f().translate([0.2, 0.3, 0.25]).scale([0.5, 0.15, 0.25]),
         "bsdf": wall,
     }
-    return LightRig(load_dict({"type": "scene", **parts}), panoramas=False)
+    return LightRig(load_dict({"type": "scene", **parts}), panoramas=panoramas)

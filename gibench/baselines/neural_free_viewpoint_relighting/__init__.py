@@ -1,0 +1,64 @@
+"""Neural Free-Viewpoint Relighting (Raghavan et al. 2023): indirect light of a scene as a dot product of wavelets."""
+
+from __future__ import annotations
+
+from gibench.baselines.method import Knob, Method, Variant
+
+SURFACE = ("position", "normal", "albedo", "specular_albedo", "roughness")
+"""Channels of what is seen, that the network is given."""
+
+DENOISED = (
+    Knob("spp", 16, (1, 2, 4, 8, 16, 32), "paths a pixel of direct light, which is always denoised"),
+    Knob("denoise", True, (False, True), "whether Open Image Denoise sees indirect light too"),
+)
+"""Of all methods whose direct light is path traced and whose indirect light is a network's."""
+
+WAVELETS = (
+    Knob("wavelets", 64, (16, 32, 64, 128, 256), "of the environment, that a frame is made from"),
+    Knob(
+        "selection",
+        "area",
+        ("none", "root-area", "area"),
+        "what coefficients are weighted by before the largest are chosen: the area of their wavelet's support",
+    ),
+)
+"""Of all methods whose light is in wavelets; none of them needs another training."""
+
+METHOD = Method(
+    id="nfvr",
+    title="Neural free-viewpoint relighting",
+    family="neural",
+    tracks=("relight",),
+    paper="Raghavan et al. 2023, Neural Free-Viewpoint Relighting for Glossy Indirect Illumination",
+    implementation="gibench.baselines.neural_free_viewpoint_relighting.implementation:NeuralRelighting",
+    channels=("indirect_diffuse", "indirect_specular", *SURFACE),
+    knobs=(
+        *WAVELETS,
+        *DENOISED,
+        Knob("network", "full", ("small", "full"), "of 32 or the paper's 64 products", trains=True),
+        Knob("faces", 64, (16, 32, 64), "texels along a face of the cubemap of light", trains=True),
+        Knob(
+            "table",
+            19,
+            (12, 13, 14, 15, 16, 17, 18, 19, 20),
+            "binary logarithm of the entries of a level of the hash grid",
+            trains=True,
+        ),
+        Knob("encoding", True, (False, True), "spherical harmonics of the reflected direction", trains=True),
+        Knob(
+            "pixels",
+            "important",
+            ("uniform", "important"),
+            "where training looks: anywhere, or also where it is hard",
+            trains=True,
+        ),
+        Knob("batch", 2048, (64, 256, 512, 1024, 2048), "pixels of a step", trains=True),
+        Knob("learned", 300, (16, 32, 64, 96, 150, 300), "wavelets of a step", trains=True),
+    ),
+    budget="wavelets",
+    trains=True,
+    variants=(
+        Variant("no-encoding", {"encoding": False}),
+        Variant("uniform-pixels", {"pixels": "uniform"}),
+    ),
+)

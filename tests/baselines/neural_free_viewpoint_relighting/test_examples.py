@@ -1,0 +1,91 @@
+"""Where a step looks, and which wavelets it is told of."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from gibench.baselines.neural_free_viewpoint_relighting.examples import Disagreement, Draw, Seen, spread
+from gibench.baselines.wavelets.selection import largest
+from tests.baselines.neural_free_viewpoint_relighting.made import Made
+
+
+def frame(truth, material=None, detail=None, points=None):
+    count = len(truth)
+    matt = torch.zeros(count, 13)
+    matt[:, 6] = 1.0
+    return Seen(
+        torch.linspace(0.01, 0.99, count)[:, None].expand(-1, 3) if points is None else points,
+        matt if material is None else material,
+        truth[:, None].expand(-1, 3),
+        torch.zeros(count) if detail is None else detail,
+    )
+
+
+def drawn(seen, disagreement, pixels=400):
+    """How often each pixel is drawn."""
+    draw = Draw(pixels, 8, disagreement)
+    return np.bincount(draw._drawn(seen, np.random.default_rng(0)), minlength=len(seen.points))
+
+
+def test_a_quarter_each_where_views_disagree_where_there_is_detail_and_gloss():
+    one, other = torch.full((40,), 0.5), torch.full((40,), 0.5)
+    other[7] = 3.0  # seen otherwise from elsewhere
+    detail = torch.zeros(40)
+    detail[11] = 0.3
+    material = frame(one).material.clone()
+    material[20, 6], material[20, 10:] = 0.05, 0.9
+    seen = frame(one, material, detail)
+    counts = drawn(seen, Disagreement([seen, frame(other)]))
+    assert counts.sum() == 400
+    assert counts[7] > 90  # beside its share of the uniform quarter
+    assert counts[11] >= 100
+    assert counts[20] >= 100
+    others = np.delete(counts, [7, 11, 20])
+    assert 50 < others.sum() < 110
+
+
+def test_without_importance_and_without_anything_important_all_pixels_are_alike():
+    seen = frame(torch.full((40,), 0.5))
+    for disagreement in (None, Disagreement([seen])):
+        counts = drawn(seen, disagreement, 4000)
+        assert counts.min() > 60
+        assert counts.max() < 150
+
+
+def test_a_brighter_environment_is_no_disagreement():
+    light = torch.linspace(0.1, 0.2, 40)
+    found = Disagreement([frame(light), frame(light + 1e-4)]).at(frame(light).points)
+    assert found.max() < 1e-6
+
+
+def test_half_of_the_wavelets_are_the_largest_and_none_comes_twice():
+    seen, coefficients = Made(1)[0]
+    example = Draw(16, 40, None)((seen, coefficients), np.random.default_rng(1))
+    places = example.places.numpy()
+    assert len(np.unique(places)) == 40
+    np.testing.assert_array_equal(places[:20], largest(coefficients, 20))
+    assert example.light.shape == (40, 3)
+    assert example.truth.shape == (16, 3)
+    again = Draw(16, 40, None)((seen, coefficients), np.random.default_rng(1))
+    assert torch.equal(again.places, example.places)
+    few = Draw(16, 1000, None)((seen, coefficients), np.random.default_rng(1))  # of 96
+    assert len(np.unique(few.places.numpy())) == 96
+
+
+def test_a_frame_that_sees_nothing_is_black():
+    seen, coefficients = Made(1)[0]
+    empty = Seen(*(part[:0] for part in seen))
+    example = Draw(16, 8, Disagreement([empty]))((empty, coefficients), np.random.default_rng(0))
+    assert not example.truth.any()
+    assert not example.light.any()
+    assert spread((empty, coefficients), 10, 8).points.shape == (0, 3)
+
+
+@pytest.mark.parametrize(("pixels", "count"), [(10, 10), (10**6, 200)])
+def test_held_out_pixels_are_spread_evenly(pixels, count):
+    example = spread(Made(1)[0], pixels, 16)
+    assert example.points.shape == (count, 3)
+    assert len(torch.unique(example.points, dim=0)) == count
+    assert example.light.shape == (16, 3)
