@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import lru_cache, partial
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import torch
@@ -28,6 +28,7 @@ from gibench.baselines.training import artifacts
 from gibench.baselines.training.checkpoints import Checkpoint
 from gibench.baselines.training_set import TrainingSet
 from gibench.baselines.wavelets.light import WaveletLight, chosen_light, coefficients_of
+from gibench.baselines.wavelets.selection import Weighting
 from gibench.rendering.backend import torch_device
 from gibench.rendering.denoise import denoise
 
@@ -45,7 +46,8 @@ class NeuralRelighting(DirectLight):
         """Take other settings that do not train."""
         super().adjust(settings)
         self.settings = dict(settings)
-        self._wavelets, self._selection = int(settings["wavelets"]), str(settings["selection"])
+        self._wavelets = int(settings["wavelets"])
+        self._selection = cast("Weighting", settings["selection"])
 
     def train(self, training: Training) -> float:
         """Learn the scene. Returns seconds that were spent before."""

@@ -45,7 +45,7 @@ class Box:
         # A flat scene has no extent along an axis.
         size = (highest - lowest).clamp(min=1e-3) * (1 + MARGIN)
         corner = (lowest + highest - size) / 2
-        return Box(tuple(corner.tolist()), tuple(size.tolist()))  # type: ignore[arg-type]
+        return Box(tuple(corner.tolist()), tuple(size.tolist()))
 
     def inside(self, places: Tensor) -> Tensor:
         """Places (…, 3) in shares of the box, in [0, 1]; what is outside is on its faces."""

@@ -28,7 +28,7 @@ pads them to the published size.
 FIELD_PIXELS = 1 << 14
 """Pixels whose features are looked up at once: an index for each corner of each level is the largest of a frame."""
 
-LARGEST = 1 << 20
+LARGEST = 1 << 19
 """Numbers of a hidden layer at once, whatever the resolution: what fits into the caches of a processor."""
 
 
