@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,7 +13,8 @@ from torch import Tensor
 
 from gibench.baselines.image_to_image.frames import Frames
 from gibench.baselines.method import Setting
-from gibench.baselines.neural_global_illumination.inputs import CODE, Measure, assembled, per_radiance
+from gibench.baselines.moving_light.measure import CODE, Measure, area_of, per_radiance
+from gibench.baselines.neural_global_illumination.inputs import assembled
 from gibench.baselines.neural_global_illumination.network import FULL, SMALL, NeuralGlobalIllumination, Size
 from gibench.baselines.training.batches import batches
 from gibench.baselines.training.budget import Budget
@@ -22,15 +22,12 @@ from gibench.baselines.training.checkpoints import Checkpoint
 from gibench.baselines.training.crops import random_window
 from gibench.baselines.training.curves import Trained
 from gibench.baselines.training.display import displayed
-from gibench.baselines.training.errors import TrainingError
 from gibench.baselines.training.learner import Learner, Step
 from gibench.baselines.training.loop import train
 from gibench.baselines.training.losses.perceptual import SMALLEST, Lpips
 from gibench.baselines.training.losses.pixels import absolute
 from gibench.baselines.training.reproducible import seeded
 from gibench.baselines.training.schedule import half_cosine, set_rate
-from gibench.datasets.lightings import lighting_of
-from gibench.rendering.lighting import AreaLight
 
 STEPS = 1_000_000
 """Where no time is set (section 3.7.1)."""
@@ -102,17 +99,6 @@ class Examples:
         rest = ((images["color"] - indirect).clamp(min=0) * exposure).clamp(max=1)
         shown = torch.tensor(area.radiance)[:, None, None] * (self.measure.indirect * exposure)
         return Example(inputs, code, rest, shown)
-
-
-def area_of(frames: Frames, index: int) -> AreaLight:
-    """The light of a frame. Raises TrainingError where no area light lights it."""
-    row = {str(name): value for name, value in frames.rows.iloc[index].items()}
-    area = lighting_of(row, Path()).area
-    if area is None:
-        raise TrainingError(
-            f"training frame {row['file']} is not lit by an area light: make the dataset with --lighting area-light"
-        )
-    return area
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,9 @@ import pytest
 import torch
 
 from gibench.baselines.method import MethodError, View
+from gibench.baselines.moving_light.measure import Measure
 from gibench.baselines.neural_global_illumination import METHOD
 from gibench.baselines.neural_global_illumination.implementation import NeuralLight
-from gibench.baselines.neural_global_illumination.inputs import Measure
 from gibench.baselines.neural_global_illumination.network import SMALL, NeuralGlobalIllumination
 from gibench.baselines.stages import Stages
 from gibench.baselines.training.artifacts import RECORD, WEIGHTS

@@ -8,13 +8,8 @@ import numpy as np
 import pytest
 import torch
 
-from gibench.baselines.neural_global_illumination.inputs import (
-    CODE,
-    LIGHTING,
-    Measure,
-    assembled,
-    per_radiance,
-)
+from gibench.baselines.moving_light.measure import CODE, Measure, per_radiance
+from gibench.baselines.neural_global_illumination.inputs import LIGHTING, assembled
 from gibench.baselines.neural_global_illumination.network import INPUTS
 from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.channels import CHANNELS, CUES
@@ -119,19 +114,3 @@ def test_a_frame_of_sky_and_one_at_the_light_are_finite():
     found = assembled(images, CAMERA, AREA, MEASURE, "all")
     assert found.isfinite().all()
     assert found.abs().max() <= 2
-
-
-def test_the_measure_of_a_room():
-    images = frame()
-    found = Measure.of_frames([(images, AREA)])
-    both = torch.cat([images["position"].flatten(1), images["reflected_position"].flatten(1)], dim=1)
-    for k in range(3):
-        assert found.centre[k] - found.half[k] == pytest.approx(float(both[k].min()), abs=1e-5)
-        assert found.centre[k] + found.half[k] == pytest.approx(float(both[k].max()), abs=1e-5)
-    light = (images["indirect_diffuse"] + images["indirect_specular"])[:2] / torch.tensor([4.0, 2.0])[
-        :, None, None
-    ]
-    assert found.indirect == pytest.approx(float(light.sum() / (3 * 20)), rel=1e-5)
-    assert Measure.of_facts(found.facts()) == found
-    dark = {name: torch.zeros_like(image) for name, image in images.items()}
-    assert Measure.of_frames([(dark, AREA)]) == Measure((0.0,) * 3, (1.0,) * 3, 1.0, 1.0)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 import torch
 
+from gibench.baselines.moving_light.measure import CODE
 from gibench.baselines.neural_global_illumination import METHOD
-from gibench.baselines.neural_global_illumination.inputs import CODE
 from gibench.baselines.neural_global_illumination.network import SMALL, NeuralGlobalIllumination
 from gibench.baselines.neural_global_illumination.training import Example, Plan, Predicting, size_of
 from gibench.baselines.training.batches import batches

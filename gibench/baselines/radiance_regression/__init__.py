@@ -1,0 +1,32 @@
+"""Radiance regression functions (Ren et al. 2013): a small network for each part of a room."""
+
+from __future__ import annotations
+
+from gibench.baselines.linearly_transformed_cosines import SHADOWS
+from gibench.baselines.method import Knob, Method
+
+SURFACE = ("position", "normal", "albedo", "specular_albedo", "roughness")
+"""Channels of what is seen, that the networks are given."""
+
+METHOD = Method(
+    id="rrf",
+    title="Radiance regression functions",
+    family="neural",
+    tracks=("moving-light",),
+    paper="Ren et al. 2013, Global Illumination with Radiance Regression Functions",
+    implementation="gibench.baselines.radiance_regression.implementation:RegressedLight",
+    channels=(
+        "direct_diffuse",
+        "direct_specular",
+        "indirect_diffuse",
+        "indirect_specular",
+        *SURFACE,
+    ),
+    knobs=(
+        Knob("cells", 1024, (16, 64, 256, 1024), "parts of the room, a network of 52 kB each", trains=True),
+        *SHADOWS,
+    ),
+    budget="shadow_rays",
+    trains=True,
+)
+"""The method `rrf`: indirect light by networks, direct light by linearly transformed cosines."""

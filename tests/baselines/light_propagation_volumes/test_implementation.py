@@ -1,0 +1,213 @@
+"""Frames of `lpv`: what a closed box reflects, black light, hard lights, and one kernel for all frames."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import drjit as dr
+import numpy as np
+import pytest
+
+from gibench.baselines.light_propagation_volumes import METHOD
+from gibench.baselines.light_propagation_volumes.emission import lattice, lit_volume
+from gibench.baselines.light_propagation_volumes.geometry import covered
+from gibench.baselines.light_propagation_volumes.implementation import PropagatedLight
+from gibench.baselines.light_propagation_volumes.volume import Grid
+from gibench.baselines.linearly_transformed_cosines.rectangle import light_arrays
+from gibench.baselines.method import MethodError, View
+from gibench.baselines.stages import Stages
+from gibench.rendering.camera import PinholeCamera
+from gibench.rendering.light_rig import LightRig
+from gibench.rendering.lighting import AreaLight, Lighting, Shot
+from gibench.rendering.render import render_frame
+from gibench.rendering.scene import load_dict
+from tests.baselines.material_strips import CAMERA, strips_rig
+from tests.baselines.sites import site
+from tests.rendering import scenes
+from tests.rendering.test_kernels import kernels_of
+
+RESOLUTION = (24, 20)
+LIGHT = AreaLight((0.0, 0.0, 1.8), (0, 0.1, -1), 0.6, 0.6, (5, 4, 3))
+SETTINGS = {"cells": 8, "steps": 32, "virtual_lights": 16384, "rays": 1}
+
+
+def prepared(rig, folder, **settings):
+    running = PropagatedLight(METHOD.settings({**SETTINGS, **settings}))
+    running.prepare(dataclasses.replace(site(rig.scene, folder), rig=rig))
+    return running
+
+
+@pytest.fixture(scope="module")
+def rig():
+    return strips_rig()
+
+
+@pytest.fixture(scope="module")
+def method(rig, tmp_path_factory):
+    return prepared(rig, tmp_path_factory.mktemp("lpv"))
+
+
+def frame(rig, method, light, resolution=RESOLUTION, camera=CAMERA):
+    rig.set(Lighting(area=light))
+    stages = Stages()
+    found = method.render(View(Shot(camera, Lighting(area=light)), None, resolution, 0, 0), stages)
+    assert {"virtual lights", "propagation", "gather", "g-buffer", "shadow rays", "filtering"} == set(
+        stages.seconds
+    )
+    for image in (found.color, found.indirect):
+        assert image.shape == (resolution[1], resolution[0], 3)
+        assert np.isfinite(image).all()
+        assert (image >= 0).all()
+    return found
+
+
+WHITE = 0.6
+
+
+@pytest.fixture(scope="module")
+def white_room():
+    wall = scenes.two_sided(type="diffuse", reflectance=scenes.rgb(WHITE))
+    parts = {}
+    for axis in range(3):
+        for side in (-1, 1):
+            centre = [float(side) if a == axis else 0.0 for a in range(3)]
+            parts[f"wall{axis}{side > 0}"] = scenes.rectangle(centre, [-c for c in centre], (1, 1), bsdf=wall)
+    return LightRig(load_dict({"type": "scene", **parts}), panoramas=False)
+
+
+@pytest.fixture(scope="module")
+def white_folder(tmp_path_factory):
+    """Where its bakes are."""
+    return tmp_path_factory.mktemp("white")
+
+
+INSIDE = PinholeCamera((0.0, -0.9, 0.0), (0.0, 1.0, -0.2), np.radians(80.0))
+
+
+@pytest.mark.parametrize(("bounces", "depth"), [(1, 2), (4, 5)])
+def test_indirect_light_of_a_closed_white_room_is_that_of_paths(white_room, white_folder, bounces, depth):
+    """Once reflected light, and most of all of it, where nothing but walls is: they need not block light."""
+    light = AreaLight((0.0, 0.0, 0.9), (0, 0, -1), 0.5, 0.5, (5, 4, 3))
+    white_room.set(Lighting(area=light))
+    truth = render_frame(
+        white_room.scene,
+        INSIDE,
+        resolution=RESOLUTION,
+        channels=("indirect_diffuse",),
+        spp=64,
+        max_depth=depth,
+    ).arrays["indirect_diffuse"]
+    method = prepared(white_room, white_folder, bounces=bounces, geometry=False)
+    found = frame(white_room, method, light, camera=INSIDE).indirect
+    np.testing.assert_allclose(found.mean(axis=(0, 1)), truth.mean(axis=(0, 1)), rtol=0.15)
+    method.adjust(METHOD.settings({**SETTINGS, "bounces": bounces}))
+    blocked = frame(white_room, method, light, camera=INSIDE).indirect
+    assert (
+        0.5 * found.mean() < blocked.mean() < found.mean()
+    )  # walls are in the way of what passes along them
+
+
+def test_virtual_lights_hold_the_light_that_the_room_reflects(white_room):
+    """In a closed room every path hits a wall: it reflects its albedo, and what comes after that its square."""
+    grid = Grid((-1.05, -1.05, -1.05), 2.1 / 8, (8, 8, 8))
+    # So small that hardly a path meets the lamp itself, which is black.
+    area = AreaLight((0.1, 0.2, 0.3), (0.3, 0.5, -1), 0.01, 0.01, (5, 4, 3))
+    white_room.set(Lighting(area=area))
+    for bounces, expected in ((1, WHITE), (3, WHITE + WHITE**2 + WHITE**3)):
+        state = lit_volume(white_room.scene, grid.arrays, light_arrays(area), 4096, bounces, grid.size)
+        assert 4 * np.pi * np.array(state[0]).sum() == pytest.approx(expected, rel=1e-3)
+
+
+def test_the_lattice_is_even():
+    u = np.array([np.array(part) for part in lattice(4096)])
+    assert u.min() >= 0
+    assert u.max() < 1
+    assert u.mean(axis=1) == pytest.approx(0.5, abs=1e-3)
+    assert (u[:, None] * u[None]).mean(axis=2)[~np.eye(4, dtype=bool)] == pytest.approx(0.25, abs=2e-3)
+
+
+def test_walls_cover_what_is_behind_them(white_room):
+    """A wall on a face of the grid covers it: a quarter evenly, half by direction."""
+    grid = Grid((-1.0, -1.0, -1.0), 0.5, (4, 4, 4))
+    cover = covered(white_room.scene, grid, 1 << 17)
+    middle = cover[0, 2, 2]
+    assert middle == pytest.approx([0.25, 0.5, 0, 0], abs=0.05)
+    assert not cover[2, 2, 2].any()
+
+
+def test_frames_compile_no_kernel_again(rig, method):
+    """Other lights and other cameras: the kernels of the first frame, recorded once."""
+
+    def once(number):
+        light = dataclasses.replace(LIGHT, centre=(0.1 * number, 0.0, 1.7), radiance=(1.0, 2.0, 1.0 + number))
+        camera = dataclasses.replace(CAMERA, position=(0.05 * number, -2.4, 1.2))
+        rig.set(Lighting(area=light))
+        view = View(Shot(camera, Lighting(area=light)), None, RESOLUTION, number, number)
+        return kernels_of(lambda: dr.eval(method.render(view, Stages())._images["color"]))
+
+    once(0)
+    launched = [once(number) for number in range(1, 5)]
+    assert launched[0]
+    assert all(kernels == launched[0] for kernels in launched)
+    assert {name: kernel.recordings for name, kernel in method.kernels.items()} == dict.fromkeys(
+        method.kernels, 1
+    )
+
+
+def test_black_light_is_black(rig, method):
+    black = dataclasses.replace(LIGHT, radiance=(0, 0, 0))
+    found = frame(rig, method, black)
+    assert not found.color.any()
+    red = frame(rig, method, dataclasses.replace(LIGHT, radiance=(1, 0, 0)))
+    assert red.indirect[..., 0].any()
+    assert not red.color[..., 1:].any()
+
+
+@pytest.mark.parametrize(
+    "light",
+    [
+        AreaLight((0.0, 1.5, 1.0), (0, -1, 0), 0.6, 0.6, (5, 4, 3)),  # in a wall
+        AreaLight((0.0, 0.0, -0.5), (0, 0, -1), 0.6, 0.6, (5, 4, 3)),  # seen by no surface
+        AreaLight((0.0, -1.8, 1.0), (0, -1, 0), 3.0, 3.0, (5, 4, 3)),  # fills the view
+        AreaLight((0.0, 0.0, 1.8), (0, 0, -1), 0.01, 0.01, (5, 4, 3)),
+    ],
+)
+def test_hard_lights_give_finite_light(rig, method, light):
+    frame(rig, method, light)
+
+
+def test_light_is_linear_and_frames_repeat(rig, method):
+    one = frame(rig, method, LIGHT).indirect
+    np.testing.assert_array_equal(frame(rig, method, LIGHT).indirect, one)
+    for scale in (2e-5, 2e4):
+        scaled = dataclasses.replace(LIGHT, radiance=tuple(scale * c for c in LIGHT.radiance))
+        np.testing.assert_allclose(frame(rig, method, scaled).indirect, scale * one, rtol=1e-5)
+
+
+def test_a_frame_of_sky_alone_and_a_larger_one(rig, method):
+    up = PinholeCamera((0.0, 0.0, 3.0), (0.0, 0.1, 9.0), 1.0)
+    assert not frame(rig, method, LIGHT, camera=up).color.any()
+    frame(rig, method, LIGHT, resolution=(240, 200))
+
+
+def test_a_room_without_diffuse_surfaces_has_no_virtual_lights(tmp_path):
+    mirror = scenes.MATERIALS["mirror"]
+    parts = {
+        "floor": scenes.rectangle([0, 0, 0], [0, 0, 1], (1.5, 1.5), bsdf=mirror),
+        "wall": scenes.rectangle([0, 1.5, 1], [0, -1, 0], (1.5, 1), bsdf=scenes.MATERIALS["metal"]),
+    }
+    rig = LightRig(load_dict({"type": "scene", **parts}), panoramas=False)
+    assert not frame(rig, prepared(rig, tmp_path, bounces=4), LIGHT).indirect.any()
+
+
+def test_more_steps_without_another_preparation(rig, method):
+    before = frame(rig, method, LIGHT).indirect.mean()
+    method.adjust(METHOD.settings({**SETTINGS, "steps": 2}))
+    assert 0 < frame(rig, method, LIGHT).indirect.mean() < before
+    method.adjust(METHOD.settings(SETTINGS))
+
+
+def test_a_frame_without_an_area_light_is_refused(rig, method):
+    rig.set(Lighting())
+    with pytest.raises(MethodError, match="lpv is for frames under an area light"):
+        method.render(View(Shot(CAMERA), None, RESOLUTION, 0, 0), Stages())
