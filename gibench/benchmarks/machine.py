@@ -5,16 +5,14 @@ from __future__ import annotations
 import hashlib
 import importlib.metadata
 import json
-import multiprocessing
-import threading
 from collections.abc import Mapping
 from contextlib import suppress
 from multiprocessing.connection import Connection
 from typing import Any
 
 from gibench.benchmarks.errors import RunError
-from gibench.datasets.pool import end_with_parent, leave_signals_to_parent
 from gibench.errors import GibenchError
+from gibench.processes import ChildProcess, ProcessEnded, TookTooLong
 
 #: Packages whose version changes times or pixels, beside those that the renderer names itself.
 PACKAGES = ("numpy", "torch")
@@ -31,21 +29,15 @@ def examine(variant: str, threads: int) -> dict[str, Any]:
 
     A process of its own looks, since loading a renderer may abort it. Raises RunError or what `select_variant` does.
     """
-    context = multiprocessing.get_context("spawn")
-    ours, theirs = context.Pipe()
-    process = context.Process(target=_look, args=(theirs, variant, threads), daemon=True)
-    process.start()
-    theirs.close()
     try:
-        if not ours.poll(LONGEST_LOOK):
-            raise RunError(f"the renderer has not started within {LONGEST_LOOK:g} s: see `gibench doctor`")
-        found = ours.recv()
-    except EOFError:
+        with ChildProcess(_look, variant, threads) as process:
+            found = process.receive(LONGEST_LOOK)
+    except TookTooLong:
+        raise RunError(
+            f"the renderer has not started within {LONGEST_LOOK:g} s: see `gibench doctor`"
+        ) from None
+    except ProcessEnded:
         raise RunError("the renderer ends its process: `gibench doctor` shows why") from None
-    finally:
-        process.kill()
-        process.join()
-        ours.close()
     if isinstance(found, GibenchError):
         raise found
     return dict(found)
@@ -53,8 +45,6 @@ def examine(variant: str, threads: int) -> dict[str, Any]:
 
 def _look(connection: Connection, variant: str, threads: int) -> None:
     """Body of the process: send the facts, or what is wrong."""
-    leave_signals_to_parent()
-    threading.Thread(target=end_with_parent, daemon=True).start()
     try:
         connection.send(_facts(variant, threads))
     except GibenchError as problem:

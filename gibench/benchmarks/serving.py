@@ -55,7 +55,7 @@ def serve(
         served, prepared = 0, None
         phase, clock = "start", time.perf_counter()
         while True:
-            kind, content = process.receive(seconds[phase])
+            kind, content = process.message(seconds[phase])
             spent = time.perf_counter() - clock
             clock = time.perf_counter()
             if kind == "ready":
@@ -99,9 +99,9 @@ def train(
     """Start a process that trains on rooms; what it took, or None where it failed, which the record of `job` says."""
     with Process(task, wanted) as process:
         clock = time.perf_counter()
-        kind, content = process.receive(STARTUP_SECONDS + limits.wait)
+        kind, content = process.message(STARTUP_SECONDS + limits.wait)
         if kind == "ready":
-            kind, content = process.receive(limits.prepare)
+            kind, content = process.message(limits.prepare)
         spend("prepare", time.perf_counter() - clock)
     if kind == "trained":
         task.log.unlink(missing_ok=True)

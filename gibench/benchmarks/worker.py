@@ -26,7 +26,6 @@ import os
 import shutil
 import signal
 import sys
-import threading
 import time
 import traceback
 from contextlib import suppress
@@ -48,7 +47,6 @@ from gibench.benchmarks.costs import preparation
 from gibench.benchmarks.memory import gpu_peak_mb, peak_mb, reset_peak
 from gibench.benchmarks.scenes import SceneFiles, lay_out
 from gibench.datasets.files import sync_tree, through_no_link
-from gibench.datasets.pool import end_with_parent, leave_signals_to_parent
 from gibench.errors import GibenchError
 
 #: Lane of the random numbers that methods are given, far from those of the generators and the references.
@@ -98,8 +96,6 @@ def method_seed(seed: int, room: int, *more: int) -> int:
 
 def work(connection: Connection, task: Task) -> None:
     """Body of the process."""
-    leave_signals_to_parent()
-    threading.Thread(target=end_with_parent, daemon=True).start()
     log = open(task.log, "wb", buffering=0, opener=through_no_link)  # noqa: SIM115 - as long as the process
     for stream in (1, 2):
         os.dup2(log.fileno(), stream)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from gibench.datasets import exr, pool
 from gibench.datasets.making import default_threads
 from gibench.datasets.recipes import Recipe
-from gibench.datasets.room_making import LoadedRoom, Renderer, given_cameras, sampled_room, written_room
+from gibench.datasets.room_making import LoadedRoom, Renderer, sampled_room, written_room
 from gibench.generators.parts import Room
 
 if TYPE_CHECKING:
@@ -89,9 +89,8 @@ class RoomChecker:
         seconds = time.perf_counter() - started
         measured = None if self.has_measured else self._measured(built)
         self.has_measured = True
-        frames = len(self.recipe.rendered_views(given_cameras(self.recipe, room), room))
         return {
-            "frames": frames,
+            "frames": len(self.recipe.rendered_views(built.given_cameras, room)),
             "rejections": dict(built.rejections),
             "seconds": seconds,
             "measured": measured,

@@ -21,7 +21,7 @@ from gibench.datasets.errors import Interrupted, MakingError
 from gibench.datasets.files import write_whole
 from gibench.datasets.previews import contact_sheet, write_picture
 from gibench.datasets.recipes import Recipe
-from gibench.datasets.room_making import Renderer, RoomMaker, given_cameras, machine
+from gibench.datasets.room_making import Renderer, RoomMaker, imported, machine
 from gibench.datasets.unfinished import unfinished_rooms
 
 
@@ -146,7 +146,7 @@ class _Run:
             manifests.refuse_other(root, self.manifest, recipe)
         whole = folder.whole_rooms(root)
         frames = [
-            len(recipe.rendered_views(given_cameras(recipe, room), room)) for room in range(recipe.rooms)
+            len(recipe.rendered_views(self._given_cameras(room, whole), room)) for room in range(recipe.rooms)
         ]
         frames_before = sum(frames[room] for room in whole if room < len(frames))
         self.frames_of: Counter[int] = Counter()
@@ -161,6 +161,14 @@ class _Run:
         rejected = {int(room): why for room, why in (self.manifest or {}).get("rejected_rooms", {}).items()}
         self.progress.rejected_rooms.update(rejected)
         self.rooms = sorted(set(range(recipe.rooms)) - set(whole) - set(rejected))
+
+    def _given_cameras(self, room: int, whole: list[int]) -> int:
+        """Of a scene that is still to be made: it is read, so that a wrong one is refused before anything is made."""
+        if not self.recipe.scenes:
+            return 0
+        if room in whole:
+            return int(manifests.room_record(self.root, room).get("given_cameras", 0))
+        return len(imported(self.recipe, room).cameras)
 
     def do(self, work: pool.Work, workers: int, cluster: str | None) -> None:
         self.on_progress(self.progress)

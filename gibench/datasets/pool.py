@@ -9,21 +9,18 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import multiprocessing
 import os
-import signal
-import threading
 import time
 import traceback
 from collections import deque
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
-from multiprocessing.process import BaseProcess
 from typing import Any
 
 from gibench.datasets.errors import BadScene, MakingError, RecipeError
 from gibench.errors import GibenchError
+from gibench.processes import ChildProcess, ProcessEnded
 
 #: Rooms after which a worker makes way for a fresh one.
 ROOMS_PER_WORKER = 25
@@ -78,8 +75,7 @@ class Listener:
 
 @dataclass
 class _Worker:
-    process: BaseProcess
-    connection: Connection
+    process: ChildProcess
     rooms_left: float
     room: int | None = None
     ready: bool = False
@@ -116,19 +112,23 @@ def run_rooms(work: Work, rooms: Iterable[int], listener: Listener, *, workers: 
                     worker.room = left.popleft()
                     worker.last_message = worker.last_computed = time.monotonic()
                     with contextlib.suppress(OSError):  # it has just died, and is heard of below
-                        worker.connection.send(worker.room)
-            wait([worker.connection for worker in running], timeout=LOOK_SECONDS)
+                        worker.process.connection.send(worker.room)
+            wait([worker.process.connection for worker in running], timeout=LOOK_SECONDS)
             watch.look(running)
-            for worker in [w for w in running if w.hung or w.connection.poll()]:
-                try:
-                    if worker.hung:
-                        worker.process.kill()
-                        listener.told(_whose(worker, work) + worker.hung)
-                        raise EOFError
-                    kind, content = worker.connection.recv()
-                except (EOFError, OSError):
+            for worker in [w for w in running if w.hung or w.process.connection.poll()]:
+                if worker.hung:
+                    listener.told(_whose(worker, work) + worker.hung)
+                    how = "given up, since each hung"
+                else:
+                    try:
+                        kind, content = worker.process.receive()
+                        how = ""
+                    except ProcessEnded as end:
+                        how = end.how
+                if how:
+                    worker.process.close()
                     running.remove(worker)
-                    left.extendleft(_rooms_to_retry(worker, work, deaths, listener))
+                    left.extendleft(_rooms_to_retry(worker, how, work, deaths, listener))
                     continue
                 watch.note_message(worker)
                 if _handle(worker, kind, content, listener):
@@ -137,8 +137,7 @@ def run_rooms(work: Work, rooms: Iterable[int], listener: Listener, *, workers: 
         for worker in running:
             worker.process.kill()
         for worker in running:
-            worker.process.join()
-            worker.connection.close()
+            worker.process.close()
 
 
 class _Watch:
@@ -168,7 +167,7 @@ class _Watch:
             if seconds is None or seconds - worker.seconds > COMPUTING or not worker.busy:
                 worker.last_computed, worker.seconds = now, seconds or worker.seconds
             limit = max(COMPUTING_PATIENCE, SILENCES * self.longest) if self.longest else float("inf")
-            if not worker.busy or worker.connection.poll():
+            if not worker.busy or worker.process.connection.poll():
                 continue
             silence = now - worker.last_message
             if silence > limit:
@@ -177,7 +176,7 @@ class _Watch:
                 worker.hung = f"hangs: it has not computed anything for {now - worker.last_computed:.0f} s"
 
 
-def _processor_seconds(process: BaseProcess) -> float | None:
+def _processor_seconds(process: ChildProcess) -> float | None:
     """Processor time of a process so far; None where that cannot be known, or it has ended."""
     import psutil
 
@@ -213,21 +212,18 @@ def _handle(worker: _Worker, kind: str, content: Any, listener: Listener) -> boo
     worker.rooms_left -= 1
     if worker.rooms_left > 0:
         return False
-    worker.connection.close()  # its loop ends there
-    worker.process.join()
+    worker.process.end()
     return True
 
 
-def _rooms_to_retry(worker: _Worker, work: Work, deaths: set[int], listener: Listener) -> list[int]:
-    """Rooms to do again after a worker's death: the one in hand, if any. Raises `MakingError` the second time."""
-    worker.process.join()
-    code = worker.process.exitcode or 0
-    how = f"killed by {signal.Signals(-code).name}" if code < 0 else f"ended with code {code}"
-    if worker.hung:
-        how = "given up, since each hung"
-        if not worker.ready and HANGING_START not in deaths:
-            deaths.add(HANGING_START)
-            return []
+def _rooms_to_retry(worker: _Worker, how: str, work: Work, deaths: set[int], listener: Listener) -> list[int]:
+    """Rooms to do again after a worker's death: the one in hand, if any. Raises `MakingError` the second time.
+
+    how: it died.
+    """
+    if worker.hung and not worker.ready and HANGING_START not in deaths:
+        deaths.add(HANGING_START)
+        return []
     if not worker.ready:
         raise MakingError(
             f"a worker was {how} before its first room: `gibench doctor` shows whether rendering works"
@@ -242,18 +238,11 @@ def _rooms_to_retry(worker: _Worker, work: Work, deaths: set[int], listener: Lis
 
 
 def _start_worker(work: Work) -> _Worker:
-    context = multiprocessing.get_context("spawn")
-    ours, theirs = context.Pipe()
-    process = context.Process(target=_worker, args=(theirs, work), daemon=True)
-    process.start()
-    theirs.close()
-    return _Worker(process, ours, work.rooms_per_worker)
+    return _Worker(ChildProcess(_serve, work), work.rooms_per_worker)
 
 
-def _worker(connection: Connection, work: Work) -> None:
+def _serve(connection: Connection, work: Work) -> None:
     """Body of a worker process: set up, then a room after another until the other end closes."""
-    leave_signals_to_parent()
-    threading.Thread(target=end_with_parent, daemon=True).start()
     room: int | None = None
     try:
         connection.send(("ready", work.setup()))
@@ -275,21 +264,6 @@ def _worker(connection: Connection, work: Work) -> None:
                 connection.send(("bad scene", str(problem)))
             else:
                 connection.send(("failed", explained(problem, room, work.place)))
-
-
-def leave_signals_to_parent() -> None:
-    """Ignore what asks to end: it reaches a whole group, and the process that spawned this one decides."""
-    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
-        if hasattr(signal, name):
-            signal.signal(getattr(signal, name), signal.SIG_IGN)
-
-
-def end_with_parent() -> None:
-    """Body of a thread that ends this process when the one that spawned it ends, however it does."""
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-    wait([parent.sentinel])
-    os._exit(1)
 
 
 def explained(

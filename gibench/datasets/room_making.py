@@ -35,6 +35,7 @@ from gibench.rendering.panoramas import Panorama
 if TYPE_CHECKING:
     from gibench.generators.environments.files import EnvironmentFile
     from gibench.generators.imported.room import ImportedRoom
+    from gibench.generators.imported.scene import ImportedScene
     from gibench.rendering.light_rig import LightRig
     from gibench.rendering.render import RenderedFrame
     from gibench.rendering.scene import Scene
@@ -85,13 +86,11 @@ def frame_seed(recipe: Recipe, room: int, view: int) -> int:
     return int(np.random.SeedSequence(recipe.seed, spawn_key=lane).generate_state(1)[0])
 
 
-def given_cameras(recipe: Recipe, room: int) -> int:
-    """Number of cameras that room number `room` brings along: 0 but for imported scenes. Raises `SceneFileError`."""
-    if not recipe.scenes:
-        return 0
+def imported(recipe: Recipe, room: int) -> ImportedScene:
+    """The scene of room number `room`, read from its files. Raises `SceneFileError`."""
     from gibench.generators.imported.scene import import_scene
 
-    return len(import_scene(Path(recipe.scenes[room]), recipe.import_settings()).cameras)
+    return import_scene(Path(recipe.scenes[room]), recipe.import_settings())
 
 
 @lru_cache(maxsize=1)
@@ -142,10 +141,9 @@ def _opened(room: Room | ImportedRoom, opened: str) -> Room | ImportedRoom:
 def _sampled(recipe: Recipe, room: int) -> Room | ImportedRoom:
     if recipe.scenes:
         from gibench.generators.imported.room import import_room
-        from gibench.generators.imported.scene import import_scene
 
         return import_room(
-            import_scene(Path(recipe.scenes[room]), recipe.import_settings()),
+            imported(recipe, room),
             resolution=recipe.resolution,
             seed=recipe.seed,
             index=room,
@@ -293,14 +291,13 @@ class RoomMaker:
         for lighting in dict.fromkeys(room.lightings):
             if lighting.environment is not None:
                 keep_panorama(self.root, lighting.environment.panorama)
-        given = given_cameras(recipe, number)
         waiting = unfinished.WaitingFrames(self.root, number)
         kept: list[dict[str, Any]] = []
         frames: list[Future[dict[str, Any]]] = []
         # Compressing and writing a frame goes on while the next one renders. One frame at most waits for it,
         # so memory does not grow with the number of views.
         with ThreadPoolExecutor(max_workers=1) as writer:
-            for view in recipe.rendered_views(given, number):
+            for view in recipe.rendered_views(room.given_cameras, number):
                 if (waited := waiting.take(self._known(room, view), folder)) is not None:
                     kept.append(waited)
                     report("frame", {"paths": 0, "seconds": 0.0})
@@ -316,7 +313,7 @@ class RoomMaker:
             "room": number,
             "kind": room.kind,
             "split": split_of(number, recipe.splits),
-            "given_cameras": given,
+            "given_cameras": room.given_cameras,
             "materials": list(loaded.scene.materials),
             "shapes": list(loaded.scene.shapes),
             "rejections": dict(room.rejections),

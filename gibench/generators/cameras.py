@@ -18,7 +18,7 @@ from scipy.interpolate import CubicSpline
 from gibench.errors import GibenchError
 from gibench.generators.parts import Camera, FloatArray
 from gibench.generators.trajectories import NoFarView, Spread, differences, spread_stills
-from gibench.generators.view_checks import View, check_views
+from gibench.generators.view_checks import CheckedView, check_views
 from gibench.generators.visibility import Caster
 
 HEIGHTS = (1.2, 1.8)  # of the camera above the floor, m
@@ -83,7 +83,7 @@ class ViewSpace:
         self.caster, self.shell_owners = caster, shell_owners
         shapely.prepare(self.free)
 
-    def check(self, cameras: Sequence[Camera]) -> list[View]:
+    def check(self, cameras: Sequence[Camera]) -> list[CheckedView]:
         """See `view_checks.check_views`."""
         return check_views(self.caster, cameras, self.shell_owners)
 
@@ -148,7 +148,7 @@ def sample_spread(
         ) from None
 
 
-def _candidates(rng: np.random.Generator, stage: ViewSpace) -> tuple[list[View], Counter[str]]:
+def _candidates(rng: np.random.Generator, stage: ViewSpace) -> tuple[list[CheckedView], Counter[str]]:
     """Views anywhere that pass, of a batch, and how many did not, by reason."""
     views = stage.check([_candidate(rng, stage, xy) for xy in stage.points(rng, BATCH)])
     return [v for v in views if not v.reason], Counter(v.reason for v in views if v.reason)

@@ -205,7 +205,6 @@ class Room:
     else reproduces it. openings: (N, 3, 3) windows, each as corner and two edges whose cross product points inside,
     metres. rejections: reason → count, for tries of the room and of its views. lightings: one a camera, or none where
     all frames have the room's own light.
-    lightings: one a camera, or none where all frames have the room's own light.
     """
 
     seed: int
@@ -220,3 +219,8 @@ class Room:
     openings: FloatArray = field(default_factory=lambda: np.zeros((0, 3, 3)))
     rejections: Mapping[str, int] = field(default_factory=dict)
     lightings: tuple[Lighting, ...] = ()
+
+    @property
+    def given_cameras(self) -> int:
+        """How many of the cameras it came with: none, since all are drawn."""
+        return 0

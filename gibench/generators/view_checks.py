@@ -22,7 +22,7 @@ OUTSIDE_SHARE = 0.35  # most of the view that may leave through windows
 
 
 @dataclass(frozen=True)
-class View:
+class CheckedView:
     """Findings about a candidate. reason: why it is refused, empty if it is not. objects: how many things it sees."""
 
     camera: Camera
@@ -46,7 +46,7 @@ def camera_rays(cameras: Sequence[Camera], grid: tuple[int, int] = GRID) -> Floa
     return rays.reshape(len(cameras), -1, 3)
 
 
-def check_views(caster: Caster, cameras: Sequence[Camera], shell_owners: int) -> list[View]:
+def check_views(caster: Caster, cameras: Sequence[Camera], shell_owners: int) -> list[CheckedView]:
     """Cast the grids of all candidates at once and check each.
 
     shell_owners: owners below this number are the shell's and do not count as things seen.
@@ -64,7 +64,7 @@ def check_views(caster: Caster, cameras: Sequence[Camera], shell_owners: int) ->
 
 def _judge_one(
     camera: Camera, distance: NDArray[np.float32], owner: NDArray[np.int64], shell_owners: int
-) -> View:
+) -> CheckedView:
     hit = owner >= 0
     seen, counts = np.unique(owner[hit], return_counts=True)
     things = frozenset(seen[seen >= shell_owners].tolist())
@@ -84,4 +84,4 @@ def _judge_one(
             reason = "one surface"
         elif len(things) < OBJECTS:
             reason = "few objects"
-    return View(camera, reason, len(things), things)
+    return CheckedView(camera, reason, len(things), things)

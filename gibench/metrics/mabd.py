@@ -32,7 +32,7 @@ def mabd(
 
     The MABD of a step is mean |b_t − b_{t−1}|, b being the luma of the display values; the value is the mean
     over the steps of (MABD_pred − MABD_ref)². In the published form, without motion, pixels at the same place
-    are compared. Paper 003 uses the name for what is `warping_error` here.
+    are compared. Gao et al. 2022 use the name for `warping_error`.
 
     Args:
         pred: display values in [0, 1], (T, H, W, 3), T ≥ 2, all under one exposure (`tone_map`).

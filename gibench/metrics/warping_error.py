@@ -30,8 +30,8 @@ def warping_error(
     """Warping error, mean (V_t − Ŵ_{t−1})² over the pixels visible in both frames and their channels.
 
     Ŵ is the frame before, brought to this one along the motion. Lai et al. estimate the flow and warp the
-    other way; here motion is exact. Paper 003 calls it MABD and tabulates it in units of 10⁻⁴; `mabd` is
-    another metric. The reference enters only with its own value, so that a blurred prediction can be better
+    other way; here motion is exact. Gao et al. 2022 call it MABD and tabulate it in units of 10⁻⁴; `mabd`
+    is another metric. The reference enters only with its own value, so that a blurred prediction can be better
     than the truth: read both values.
 
     Args:

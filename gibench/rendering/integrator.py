@@ -62,9 +62,63 @@ def shading_normal(si):
     return dr.mulsign(si.sh_frame.n, dr.dot(si.sh_frame.n, si.n))
 
 
-def _as_expected(weight):
-    """A BSDF sample's weight, or 1 where it has failed: another direction may be taken in its place."""
-    return dr.select(dr.max(weight) > 0, weight, 1)
+@dataclass
+class _Scattering:
+    """What a vertex reflects of a light, and how the path goes on from it.
+
+    light: number of the light that was asked, where a guide has chosen it. to_light: unit, in the frame of the vertex;
+    lit: whether there is light from there. incident: its radiance over density, with its MIS weight; value: of the BSDF
+    for it, cosine included; both 0 where there is none. direction: of the bounce, world space. weight: BSDF value over
+    density. expected: the same as the BSDF alone would sample it. pdf: per steradian. delta: whether the lobe is. eta:
+    relative index of refraction.
+    """
+
+    light: Any
+    to_light: Any
+    lit: Any
+    incident: Any
+    value: Any
+    direction: Any
+    weight: Any
+    expected: Any
+    pdf: Any
+    delta: Any
+    eta: Any
+
+
+def _guide_row(guide, si, sampler, active):
+    """Row of a guide at a vertex; 0 without one. sampler: independent."""
+    return mi.UInt32(0) if guide is None else guide.row(si, sampler, active)
+
+
+def _scatter(scene, portals, guide, context, si, bsdf, row, sampler, active) -> _Scattering:
+    """A sample of the lights and one of the next direction, by one evaluation of the BSDF: kernels stay small.
+
+    context: of the lobes that are asked for. row: of the guide at si.
+    """
+    lit = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
+    light = sample_light(scene, portals, guide, si, row, sampler, lit)
+    lit &= light.pdf != 0
+    to_light = si.to_local(light.direction)
+    value, light_bounce_pdf, bounce, weight = bsdf.eval_pdf_sample(
+        context, si, to_light, sampler.next_1d(), sampler.next_2d(), active
+    )
+    # Where the sample has failed, another direction may be taken in its place.
+    expected = dr.select(dr.max(weight) > 0, weight, 1)
+    if guide is None:
+        direction, pdf, eta = si.to_world(bounce.wo), bounce.pdf, bounce.eta
+        delta = mi.has_flag(bounce.sampled_type, mi.BSDFFlags.Delta)
+    else:
+        fraction = guide.fraction(row, bsdf, active)
+        light_bounce_pdf = guide.mixed_density(row, fraction, light.direction, light_bounce_pdf, lit)
+        direction, weight, pdf, delta, eta = guide.bounce(
+            context, si, bsdf, row, fraction, bounce, weight, sampler, active
+        )
+    mis = dr.select(light.delta, 1, mis_weight(light.pdf, light_bounce_pdf))
+    incident, value = dr.select(lit, light.weight * mis, 0), dr.select(lit, value, 0)
+    return _Scattering(
+        light.light, to_light, lit, incident, value, direction, weight, expected, pdf, delta, eta
+    )
 
 
 @dr.syntax
@@ -115,56 +169,32 @@ def _follow(
         active &= si.is_valid() & (depth < max_depth)
         bsdf = bsdf_at(si, ray)
 
-        # Light sampling.
-        lit = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-        if dr.hint(guide is not None, mode="scalar"):
-            row = guide.row(si, sampler, active)
-        light = sample_light(scene, portals, guide, si, row, sampler, lit)
-        lit &= light.pdf != 0
-        to_light = si.to_local(light.direction)
-        value, light_bounce_pdf, bounce, bounce_weight = bsdf.eval_pdf_sample(
-            context, si, to_light, sampler.next_1d(), sampler.next_2d(), active
-        )
-        if dr.hint(guide is not None, mode="scalar"):
-            guide_fraction = guide.fraction(row, bsdf, active)
-            light_bounce_pdf = guide.mixed_density(
-                row, guide_fraction, light.direction, light_bounce_pdf, lit
-            )
-        value = si.to_world_mueller(value, -to_light, si.wi)
-        weight = dr.select(light.delta, 1, mis_weight(light.pdf, light_bounce_pdf))
-        reflected = dr.select(lit, value * light.weight * weight, 0)
+        # Light sampling, and the next direction.
+        row = _guide_row(guide, si, sampler, active)
+        scattering = _scatter(scene, portals, guide, context, si, bsdf, row, sampler, active)
+        reflected = scattering.value * scattering.incident
         scattered += throughput * reflected
-
-        # The next direction.
-        bounce_weight = si.to_world_mueller(bounce_weight, -bounce.wo, si.wi)
-        expected *= _as_expected(bounce_weight)
-        pdf = bounce.pdf
-        delta = mi.has_flag(bounce.sampled_type, mi.BSDFFlags.Delta)
-        direction = si.to_world(bounce.wo)
-        bounce_eta = bounce.eta
-        if dr.hint(guide is not None, mode="scalar"):
-            direction, bounce_weight, pdf, delta, bounce_eta = guide.bounce(
-                context, si, bsdf, row, guide_fraction, bounce, bounce_weight, sampler, active
-            )
+        pdf, delta = scattering.pdf, scattering.delta
         depth += 1
         if dr.hint(recorder is not None, mode="scalar"):
             recorder.vertex(
                 row,
                 si,
                 bsdf,
-                direction,
+                scattering.direction,
                 pdf,
                 delta,
                 throughput,
                 first_emission + scattered,
-                light.light,
+                scattering.light,
                 reflected,
                 depth,
                 active,
             )
-        ray = si.spawn_ray(direction)
-        throughput *= bounce_weight
-        eta *= bounce_eta
+        ray = si.spawn_ray(scattering.direction)
+        throughput *= scattering.weight
+        expected *= scattering.expected
+        eta *= scattering.eta
         reference = mi.Interaction3f(si)
 
         # The roulette looks at what a path is expected to carry: a guided path to where much light comes from carries
@@ -226,32 +256,19 @@ def scatter_paths(
     asked = mi.BSDFContext(mi.TransportMode.Radiance, flags.ALL_LOBES if by_hand else mask)
     active = active & si.is_valid() & ((bsdf.flags() & mask) != 0) & (max_depth >= 1)
 
-    # The same calls as in the loop, and one more for the diffuse lobe alone: kernels stay small.
-    lit = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-    row = mi.UInt32(0) if guide is None else guide.row(si, sampler.independent, active)
-    light = sample_light(scene, portals, guide, si, row, sampler, lit)
-    lit &= light.pdf != 0
-    to_light = si.to_local(light.direction)
-    value, light_bounce_pdf, bounce, weight = bsdf.eval_pdf_sample(
-        asked, si, to_light, sampler.next_1d(), sampler.next_2d(), active
-    )
-    direction, pdf, eta, expected = si.to_world(bounce.wo), bounce.pdf, bounce.eta, _as_expected(weight)
-    delta = mi.has_flag(bounce.sampled_type, mi.BSDFFlags.Delta)
-    if guide is not None:
-        guide_fraction = guide.fraction(row, bsdf, active)
-        light_bounce_pdf = guide.mixed_density(row, guide_fraction, light.direction, light_bounce_pdf, lit)
-        direction, weight, pdf, delta, eta = guide.bounce(
-            asked, si, bsdf, row, guide_fraction, bounce, weight, sampler, active
-        )
-    mis = dr.select(light.delta, 1, mis_weight(light.pdf, light_bounce_pdf))
-    incident = dr.select(lit, light.weight * mis, 0)
+    # The same as in the loop, and the diffuse lobe alone besides.
+    row = _guide_row(guide, si, sampler.independent, active)
+    scattering = _scatter(scene, portals, guide, asked, si, bsdf, row, sampler, active)
+    incident, value, weight = scattering.incident, scattering.value, scattering.weight
 
     none = mi.Spectrum(0)
     if lobes == "all" or by_hand:
-        value_diffuse, value_other = split(bsdf, value, diffuse_lobe(layers, bsdf, si, to_light, lit))
-        smooth = active & (delta ^ True) & (pdf > 0)
-        bounce_diffuse = diffuse_lobe(layers, bsdf, si, si.to_local(direction), smooth)
-        bounce_diffuse *= dr.select(smooth, inverse(pdf), 0)
+        value_diffuse, value_other = split(
+            bsdf, value, diffuse_lobe(layers, bsdf, si, scattering.to_light, scattering.lit)
+        )
+        smooth = active & (scattering.delta ^ True) & (scattering.pdf > 0)
+        bounce_diffuse = diffuse_lobe(layers, bsdf, si, si.to_local(scattering.direction), smooth)
+        bounce_diffuse *= dr.select(smooth, inverse(scattering.pdf), 0)
         weight_diffuse, weight_other = split(bsdf, weight, bounce_diffuse)
         if lobes == "diffuse":
             value_other, weight_other = none, none
@@ -269,13 +286,13 @@ def scatter_paths(
         guide,
         None,
         sampler.independent,
-        si.spawn_ray(direction),
+        si.spawn_ray(scattering.direction),
         mi.Interaction3f(si),
         row,
-        pdf,
-        delta,
-        expected,
-        eta,
+        scattering.pdf,
+        scattering.delta,
+        scattering.expected,
+        scattering.eta,
         1,
         active,
         max_depth,

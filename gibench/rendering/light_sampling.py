@@ -91,13 +91,9 @@ def sample_light(scene, portals, guide, si, row, sampler, active) -> LightSample
     ray = dr.select(entering, si.spawn_ray(direction), ray)
 
     # One density for both ways to the environment.
-    outside = dr.zeros(mi.DirectionSample3f)
-    outside.d = direction
-    outside.emitter = portals.environment
+    sky, outside = portals.environment_from(direction, entering)
     pdf = dr.select(entering, scene.pdf_emitter_direction(si, outside, entering), sample.pdf)
-    sky = dr.zeros(mi.SurfaceInteraction3f)
-    sky.wi = -direction
-    radiance = dr.select(entering, portals.environment.eval(sky, entering), radiance)
+    radiance = dr.select(entering, sky, radiance)
     to_environment = entering | (sample.emitter == portals.environment)
     by_portal = dr.select(to_environment, portals.density(si.p, direction), 0)
     delta = sample.delta & (entering ^ True)

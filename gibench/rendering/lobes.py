@@ -16,9 +16,7 @@ import mitsuba as mi
 
 from gibench.rendering import flags
 from gibench.rendering.layers import Layers
-
-SMALLEST = 1.2e-38
-"""The smallest normal float32."""
+from gibench.rendering.light_sampling import inverse
 
 
 def lobes_of(mask: int) -> Any:
@@ -90,12 +88,7 @@ def _specular_weight(layers, bsdf, si, bounce, weight, active):
     """Weight of a sample of all lobes for the specular ones."""
     smooth = active & ~mi.has_flag(bounce.sampled_type, mi.BSDFFlags.Delta) & (bounce.pdf > 0)
     diffuse = diffuse_lobe(layers, bsdf, si, bounce.wo, smooth)
-    return split(bsdf, weight, dr.select(smooth, diffuse * _inverse(bounce.pdf), 0))[1]
-
-
-def _inverse(x):
-    """1/x for x ≥ 0, where 0 gives something huge yet finite."""
-    return dr.rcp(dr.maximum(x, SMALLEST))
+    return split(bsdf, weight, dr.select(smooth, diffuse * inverse(bounce.pdf), 0))[1]
 
 
 def _principled_diffuse(bsdf, si, wo, active):
@@ -113,7 +106,7 @@ def _principled_diffuse(bsdf, si, wo, active):
     lobe = (1 - 0.5 * grazing_i) * (1 - 0.5 * grazing_o)
     lobe += retro * (grazing_o + grazing_i + grazing_o * grazing_i * (retro - 1))
     inner = dr.lerp(1, 0.5 * retro, grazing_o) * dr.lerp(1, 0.5 * retro, grazing_i)
-    flat = 1.25 * (inner * (_inverse(cos_i + cos_o) - 0.5) + 0.5)
+    flat = 1.25 * (inner * (inverse(cos_i + cos_o) - 0.5) + 0.5)
     base = bsdf.eval_attribute("base_color", si, active)
     value = base * matte * dr.lerp(lobe, flat, number("flatness")) * cos_o * dr.inv_pi
     return dr.select(active & (cos_i > 0) & (cos_o > 0), value, 0)

@@ -115,3 +115,12 @@ class Portals:
             total += dr.select(inside, dr.square(distance) / dr.maximum(cosine, 1e-7), 0)
             portal += 1
         return total * self._inverse_area
+
+    def environment_from(self, direction, active):
+        """The environment in a direction: its radiance, mi.Color3f, and the point itself as a mi.DirectionSample3f."""
+        sky = dr.zeros(mi.SurfaceInteraction3f)
+        sky.wi = -direction
+        outside = dr.zeros(mi.DirectionSample3f)
+        outside.d = direction
+        outside.emitter = self.environment
+        return self.environment.eval(sky, active), outside

@@ -61,7 +61,7 @@ def apart(found: Float64, answer: Float64) -> float:
 @case("weights of multiple importance sampling", quick=True)
 def mis_weights() -> Found:
     """Densities from 1e-30, of the sky from far away, to 1e30, of the middle of a near-mirror's lobe."""
-    from gibench.rendering.integrator import mis_weight
+    from gibench.rendering.light_sampling import mis_weight
 
     grid = np.concatenate([[0.0], 10.0 ** np.arange(-30, 31)]).astype(np.float32)
     first, second = (side.ravel() for side in np.meshgrid(grid, grid))

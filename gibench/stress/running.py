@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import gc
 import importlib.util
-import multiprocessing
 import os
-import threading
 import time
 import traceback
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
-from multiprocessing.process import BaseProcess
 
-from gibench.datasets.pool import end_with_parent, leave_signals_to_parent
 from gibench.errors import GibenchError
+from gibench.processes import ChildProcess, ProcessEnded
 from gibench.rendering.backend import select_variant
 from gibench.stress.registry import Case, Check, Curve, all_cases
 
@@ -93,30 +90,25 @@ def run(
     done: list[str] = []
     left: list[Case] | None = None
     while left is None or left:
-        connection, process = _start(quick, only, done)
         try:
-            while True:
-                kind, content = connection.recv()
-                if kind == "cases":
-                    left = content
-                elif kind == "found":
-                    found.append(content)
-                elif kind == "done":
-                    assert left is not None
-                    done.append(left.pop(0).name)
-                    on_case(len(done), len(done) + len(left))
-        except EOFError:
-            process.join()
-        finally:
-            process.kill()
-            connection.close()
-        if left is None:
-            raise StressError(f"the cases cannot be loaded: their process ended with code {process.exitcode}")
-        if left:  # it has died in the hands of this one
-            died = left.pop(0)
-            what = f"the process ended with code {process.exitcode}"
-            found.append(Row(died.subject, died.name, ended(what), 0.0))
-            done.append(died.name)
+            with ChildProcess(_work, quick, only, tuple(done)) as process:
+                while True:
+                    kind, content = process.receive()
+                    if kind == "cases":
+                        left = content
+                    elif kind == "found":
+                        found.append(content)
+                    elif kind == "done":
+                        assert left is not None
+                        done.append(left.pop(0).name)
+                        on_case(len(done), len(done) + len(left))
+        except ProcessEnded as end:
+            if left is None:
+                raise StressError(f"the cases cannot be loaded: {end}") from None
+            if left:  # it has died in the hands of this one
+                died = left.pop(0)
+                found.append(Row(died.subject, died.name, ended(str(end)), 0.0))
+                done.append(died.name)
     if not done:
         raise StressError(f"no case has '{only}' in its name")
     rows = tuple(one for one in found if isinstance(one, Row))
@@ -129,19 +121,8 @@ def chosen(quick: bool, only: str) -> list[Case]:
     return [one for one in all_cases() if (one.quick or not quick) and only in one.name]
 
 
-def _start(quick: bool, only: str, done: Sequence[str]) -> tuple[Connection, BaseProcess]:
-    context = multiprocessing.get_context("spawn")
-    ours, theirs = context.Pipe()
-    process = context.Process(target=_work, args=(theirs, quick, only, tuple(done)), daemon=True)
-    process.start()
-    theirs.close()
-    return ours, process
-
-
 def _work(connection: Connection, quick: bool, only: str, done: tuple[str, ...]) -> None:
     """Body of the process: say which cases are left, then run one after the other."""
-    leave_signals_to_parent()
-    threading.Thread(target=end_with_parent, daemon=True).start()
     left = [one for one in chosen(quick, only) if one.name not in done]
     connection.send(("cases", [replace(one, run=None) for one in left]))
     for one in left:

@@ -72,6 +72,7 @@ def sample_room(seed: int, index: int, *, kinds: tuple[str, ...], views: int, **
         index=index,
         kind=kinds[0],
         cameras=(camera,) * views,
+        given_cameras=0,
         lightings=(),
         rejections={"view: too dark": 1},
     )

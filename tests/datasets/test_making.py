@@ -276,7 +276,7 @@ def test_workers_are_replaced_after_a_number_of_rooms(tmp_path, monkeypatch):
     root, recipe = tmp_path / "d", tiny(5, views=1)
     make_fake(root, recipe, work=dataclasses.replace(fake_work(root, recipe), rooms_per_worker=2))
     assert len(hired) == 3
-    assert all(not worker.process.is_alive() for worker in hired)
+    assert all(not worker.process.alive for worker in hired)
 
 
 SLOW_RUN = """
@@ -373,7 +373,7 @@ def test_a_process_that_was_stopped_itself_gives_nobody_up(monkeypatch):
     monkeypatch.setattr(pool.time, "monotonic", lambda: now[0])
     watch, worker = (
         pool._Watch(),
-        pool._Worker(None, SimpleNamespace(poll=lambda: False), 25, room=3, ready=True),
+        pool._Worker(SimpleNamespace(connection=SimpleNamespace(poll=lambda: False)), 25, room=3, ready=True),
     )
     for now[0] in (3.0, 3600.0, 3603.0):
         watch.look([worker])

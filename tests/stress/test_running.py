@@ -59,14 +59,7 @@ def work_on_toys(connection, quick, only, done):
 
 @pytest.fixture
 def toys(monkeypatch):
-    hired = running._start
-
-    def hire(*given):
-        with monkeypatch.context() as patch:
-            patch.setattr(running, "_work", work_on_toys)
-            return hired(*given)
-
-    monkeypatch.setattr(running, "_start", hire)
+    monkeypatch.setattr(running, "_work", work_on_toys)
 
 
 def test_what_a_case_raises_is_a_failed_row_beside_what_it_found():

@@ -17,8 +17,8 @@ from gibench.baselines.method import Prediction, Site, View
 from gibench.baselines.probes.baking import ProbeSettings
 from gibench.baselines.probes.maps import Probes, load_probes
 from gibench.baselines.probes.reflections import mirrored_by, surfaces_of
-from gibench.baselines.replay import Replay, camera_arrays, ray_generator
 from gibench.baselines.stages import Stages
+from gibench.rendering.replay import Replay, camera_arrays, ray_generator
 
 MAPS = ("radiance", "material_id", "reflected_position", "reflected_material_id")
 

@@ -19,12 +19,12 @@ from gibench.baselines.efficient_light_probes.training import TrainingPlan, trai
 from gibench.baselines.first_hits import hits_of_rays
 from gibench.baselines.image_to_image.device_frames import as_image
 from gibench.baselines.method import Prediction, Setting, Site, View
-from gibench.baselines.replay import Replay, camera_arrays, ray_generator
 from gibench.baselines.stages import Stages
 from gibench.rendering import surface
 from gibench.rendering.backend import torch_device
 from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.gbuffer import mirror_direction
+from gibench.rendering.replay import Replay, camera_arrays, ray_generator
 
 
 def _guides(scene, _lightmap, camera, preliminary, mirrored, glossy, width: int, height: int):

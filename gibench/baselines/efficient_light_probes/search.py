@@ -15,7 +15,7 @@ import drjit as dr
 import mitsuba as mi
 
 from gibench.baselines.probes.maps import Probes
-from gibench.baselines.replay import ray_generator
+from gibench.rendering.replay import ray_generator
 
 CONFIDENT = 0.999
 """Confidence at which a search ends, T_max (section 5)."""

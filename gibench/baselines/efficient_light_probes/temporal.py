@@ -13,7 +13,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from gibench.baselines.replay import ray_generator
+from gibench.rendering.replay import ray_generator
 
 DECAY = (0.3, 0.1)
 """Weights of the frame before and of the one before that, beside 1 for the present one (section 4.4)."""

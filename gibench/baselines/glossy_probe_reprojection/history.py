@@ -13,7 +13,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from gibench.baselines.replay import ray_generator
+from gibench.rendering.replay import ray_generator
 
 APART = 4.0
 """Sizes of a pixel by which the point that the earlier camera saw may lie aside of the one that is looked for."""

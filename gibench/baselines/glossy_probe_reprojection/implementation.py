@@ -31,9 +31,9 @@ from gibench.baselines.method import Prediction, Setting, Site, View
 from gibench.baselines.probes.baking import POSITIONS, ProbeSettings
 from gibench.baselines.probes.maps import load_probes
 from gibench.baselines.probes.reflections import mirrored_by, surfaces_of
-from gibench.baselines.replay import Replay, camera_arrays, ray_generator
 from gibench.baselines.stages import Stages
 from gibench.rendering import flags, surface
+from gibench.rendering.replay import Replay, camera_arrays, ray_generator
 
 LEAST_ENERGY = 0.01
 """Energy below which samples are all as good: equation 4 divides by it."""

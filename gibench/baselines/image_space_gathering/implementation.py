@@ -14,9 +14,9 @@ from gibench.baselines.image_space_gathering.pyramid import Layout, MirrorImage,
 from gibench.baselines.image_space_gathering.reflectance import directional_albedo
 from gibench.baselines.lightmap.deferred import OnLightmap
 from gibench.baselines.method import Prediction, View
-from gibench.baselines.replay import camera_arrays, ray_generator
 from gibench.baselines.stages import Stages
 from gibench.rendering import surface
+from gibench.rendering.replay import camera_arrays, ray_generator
 
 
 def _gbuffer(scene, lightmap, camera, width: int, height: int):

@@ -12,11 +12,11 @@ import torch
 from torch import Tensor
 
 from gibench.baselines.image_to_image.frames import Images
-from gibench.baselines.replay import Replay, camera_arrays
 from gibench.rendering.backend import torch_device
 from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.channels import SETS
 from gibench.rendering.gbuffer import surface_arrays
+from gibench.rendering.replay import Replay, camera_arrays
 from gibench.rendering.scene import Scene
 
 

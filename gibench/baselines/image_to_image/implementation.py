@@ -12,7 +12,7 @@ from gibench.baselines.image_to_image.camera_space import in_camera_space
 from gibench.baselines.image_to_image.device_frames import DeviceFrames, channels_first
 from gibench.baselines.image_to_image.examples import READ, Examples
 from gibench.baselines.image_to_image.frames import Frames, held_out
-from gibench.baselines.image_to_image.learner import EPOCHS, IndirectLight, Plan
+from gibench.baselines.image_to_image.learner import EPOCHS, IndirectLight, TrainingPlan
 from gibench.baselines.image_to_image.shading import CHANNELS, geometry, indirect
 from gibench.baselines.method import MethodError, Prediction, Setting, Site, Training, View, reading
 from gibench.baselines.sources import digest
@@ -49,7 +49,7 @@ class IndirectByNetwork(DirectLight):
         """Learn indirect light from the rooms that are not held out."""
         views = training.views
         learned, apart = held_out(views, HELD_OUT, MOST_HELD_OUT)
-        plan = Plan.of(self.settings, training.seed)
+        plan = TrainingPlan.of(self.settings, training.seed)
         with seeded(plan.seed):
             network = self.network().to(torch_device())
         examples = [Examples(Frames(views, READ, numbers)) for numbers in (learned, apart)]

@@ -45,7 +45,7 @@ EPOCHS = 80
 
 
 @dataclass(frozen=True)
-class Plan:
+class TrainingPlan:
     """What decides a training, beside its frames and its network.
 
     crop: pixels along a side of what a step sees of a frame, batch: frames a step. perceptual, adversarial: whether
@@ -59,9 +59,9 @@ class Plan:
     seed: int
 
     @staticmethod
-    def of(settings: Mapping[str, Setting], seed: int) -> Plan:
+    def of(settings: Mapping[str, Setting], seed: int) -> TrainingPlan:
         """From the settings of a method."""
-        return Plan(
+        return TrainingPlan(
             int(settings["crop"]),
             int(settings["batch"]),
             bool(settings["perceptual"]),
@@ -73,7 +73,7 @@ class Plan:
 class IndirectLight(Learner):
     """A network of `shading.indirect`, and a discriminator of single colours that learns along."""
 
-    def __init__(self, network: nn.Module, learned: Examples, held_out: Examples, plan: Plan) -> None:
+    def __init__(self, network: nn.Module, learned: Examples, held_out: Examples, plan: TrainingPlan) -> None:
         """network: on its device."""
         self.learned, self.plan = learned, plan
         # Read once, and before any clock says what a look takes.

@@ -15,9 +15,9 @@ from gibench.baselines.lightmap.glossy_layer import GlossyLayer
 from gibench.baselines.method import Site, View
 from gibench.baselines.probes.baking import ProbeSettings
 from gibench.baselines.probes.maps import load_probes
-from gibench.baselines.replay import Replay, ray_generator
 from gibench.rendering import flags
 from gibench.rendering.lobes import sample_specular
+from gibench.rendering.replay import Replay, ray_generator
 
 MAPS = ("light", "distance", "normal")
 

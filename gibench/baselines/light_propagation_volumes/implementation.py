@@ -20,10 +20,10 @@ from gibench.baselines.light_propagation_volumes.volume import EVEN, Grid, looke
 from gibench.baselines.linearly_transformed_cosines.implementation import RectangleLight, area_light
 from gibench.baselines.linearly_transformed_cosines.rectangle import light_arrays
 from gibench.baselines.method import Prediction, Setting, Site, View, reading
-from gibench.baselines.replay import Replay, camera_arrays, ray_generator
 from gibench.baselines.stages import Stages
 from gibench.rendering import surface
 from gibench.rendering.lighting import AreaLight
+from gibench.rendering.replay import Replay, camera_arrays, ray_generator
 from gibench.rendering.scene import Scene
 
 GLOSSY_CELLS = 4

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 from gibench.baselines.lightmap.bake import baked_lightmap
 from gibench.baselines.method import Setting, Site, View
-from gibench.baselines.replay import Replay, arrays_of
+from gibench.rendering.replay import Replay, arrays_of
 
 
 class OnLightmap:

@@ -12,10 +12,10 @@ import numpy as np
 from gibench.baselines.first_hits import averaged, hits_of_rays
 from gibench.baselines.lightmap.deferred import OnLightmap
 from gibench.baselines.method import Prediction, View
-from gibench.baselines.replay import camera_arrays, ray_generator
 from gibench.baselines.stages import Stages
 from gibench.rendering import surface
 from gibench.rendering.denoise import denoise
+from gibench.rendering.replay import camera_arrays, ray_generator
 
 
 def _gbuffer(scene, lightmap, camera, width: int, height: int, denoised: bool):

@@ -11,8 +11,8 @@ import mitsuba as mi
 from gibench.baselines.first_hits import averaged, hits_of_rays
 from gibench.baselines.lightmap.deferred import OnLightmap
 from gibench.baselines.method import Prediction, View
-from gibench.baselines.replay import camera_arrays, ray_generator
 from gibench.baselines.stages import Stages
+from gibench.rendering.replay import camera_arrays, ray_generator
 
 
 def _shaded(scene, lightmap, camera, width: int, height: int):

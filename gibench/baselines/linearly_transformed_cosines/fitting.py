@@ -17,10 +17,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import least_squares
 
 from gibench.baselines.linearly_transformed_cosines.table import FILE, SIDE, alphas, cosines
+from gibench.rendering.backend import select_variant
 
 SAMPLES = 24
 """Along each side of a stratified set of directions: one from the lobe, one from a broader lobe, one of all."""
@@ -67,9 +71,6 @@ def lobes(alpha: float, cosines: NDArray[np.float64]) -> list[Lobe]:
 
     Needs a vectorised variant.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     grid = (np.arange(SAMPLES) + 0.5) / SAMPLES
     u, v = (np.tile(side.ravel(), len(cosines)) for side in np.meshgrid(grid, grid))
     points = mi.Point2f(u.astype(np.float32), v.astype(np.float32))
@@ -128,8 +129,6 @@ def share_above(parameters: NDArray[Any], angle: float) -> float:
 
 def fitted(lobe: Lobe, alpha: float, start: NDArray[Any]) -> NDArray[Any]:
     """m11/α, m22/α, m13 and angle of the cosine that is most like a lobe. start: the same of a neighbour."""
-    from scipy.optimize import least_squares
-
     total, peak = lobe.mean(1.0), lobe.values.max()
     weight = np.sqrt(lobe.weights * peak / total)
 
@@ -169,8 +168,6 @@ def fit() -> NDArray[np.float32]:
 
 def main() -> None:
     """Fit the table and write it beside this module."""
-    from gibench.rendering.backend import select_variant
-
     select_variant()
     np.save(Path(__file__).with_name(FILE), fit(), allow_pickle=False)
 

@@ -15,13 +15,13 @@ import mitsuba as mi
 from gibench.baselines.first_hits import averaged
 from gibench.baselines.linearly_transformed_cosines.rectangle import light_arrays
 from gibench.baselines.linearly_transformed_cosines.shading import ratios, sampled, unshadowed
-from gibench.baselines.linearly_transformed_cosines.table import Table
+from gibench.baselines.linearly_transformed_cosines.table import TransformTable
 from gibench.baselines.method import MethodError, Prediction, Setting, Site, View
-from gibench.baselines.replay import Replay, camera_arrays
 from gibench.baselines.stages import Stages
 from gibench.rendering.backend import tracing
 from gibench.rendering.channels import CUES
 from gibench.rendering.lighting import AreaLight
+from gibench.rendering.replay import Replay, camera_arrays
 from gibench.rendering.scene import Scene
 
 
@@ -46,7 +46,7 @@ class RectangleLight:
     def __init__(self, scene: Scene, *, cues: bool = False) -> None:
         """cues: whether the basis materials of `gibench.rendering.light_cues` are lit too."""
         self.cues = cues
-        table = Table()
+        table = TransformTable()
         replay = partial(Replay, scene)
         self._unshadowed = replay(partial(unshadowed, scene, table), table.values)
         self._sampled = replay(partial(sampled, scene, table), table.values)

@@ -19,13 +19,12 @@ import mitsuba as mi
 from gibench.baselines.first_hits import FirstHits, hits_of_rays
 from gibench.baselines.linearly_transformed_cosines.polygons import above_horizon, irradiance_vector
 from gibench.baselines.linearly_transformed_cosines.rectangle import Receiver, cosine_density
-from gibench.baselines.linearly_transformed_cosines.table import Table
-from gibench.baselines.replay import ray_generator
+from gibench.baselines.linearly_transformed_cosines.table import TransformTable
 from gibench.rendering import surface
-from gibench.rendering.integrator import emission
 from gibench.rendering.light_cues import ALPHAS
-from gibench.rendering.light_sampling import inverse
+from gibench.rendering.light_sampling import emission, inverse
 from gibench.rendering.lobes import diffuse_lobe, sample_specular, split
+from gibench.rendering.replay import ray_generator
 from gibench.rendering.scene import Scene
 
 FOLLOWED = int(
@@ -86,7 +85,7 @@ class Surfaces:
         )
 
 
-def unshadowed(scene: Scene, table: Table, light, camera, cues: bool, width: int, height: int):
+def unshadowed(scene: Scene, table: TransformTable, light, camera, cues: bool, width: int, height: int):
     """Light in closed form, and what is needed to shadow it.
 
     cues: whether also for the basis materials of `light_cues`. Returns the preliminary hits; what is emitted
@@ -133,7 +132,16 @@ def unshadowed(scene: Scene, table: Table, light, camera, cues: bool, width: int
 
 
 def sampled(
-    scene: Scene, table: Table, light, camera, preliminary, models, seed, spp: int, width: int, height: int
+    scene: Scene,
+    table: TransformTable,
+    light,
+    camera,
+    preliminary,
+    models,
+    seed,
+    spp: int,
+    width: int,
+    height: int,
 ):
     """Samples of a frame, added up by pixel: lobe → those with and without shadows, mi.Float each.
 

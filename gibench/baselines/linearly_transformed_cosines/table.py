@@ -13,6 +13,8 @@ from functools import cache
 from importlib import resources
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
@@ -72,22 +74,16 @@ class Transform:
         return type(vector)((across - self.m13 * along) / self.m11, vector.y / self.m22, along)
 
 
-class Table:
+class TransformTable:
     """The table on the device. Needs a vectorised variant."""
 
     def __init__(self) -> None:
         """Load it."""
-        import drjit as dr
-        import mitsuba as mi
-
         self.values = mi.Float(table().ravel())
         dr.make_opaque(self.values)
 
     def transform(self, alpha: Any, cosine: Any) -> Transform:
         """Of mi.Float alpha ≥ 0 and cosine between view and normal ≥ 0, interpolated."""
-        import drjit as dr
-        import mitsuba as mi
-
         alpha = dr.clip(alpha, SMALLEST_ALPHA, 1)
         smallest = SMALLEST_ALPHA**0.5
         rough = (dr.sqrt(alpha) - smallest) / (1 - smallest)

@@ -20,7 +20,7 @@ from gibench.baselines.method import MethodError, Prediction, Setting, Site, Tra
 from gibench.baselines.neural_free_viewpoint_relighting import METHOD, SURFACE
 from gibench.baselines.neural_free_viewpoint_relighting.examples import Examples
 from gibench.baselines.neural_free_viewpoint_relighting.inputs import Box, hit, surfaces
-from gibench.baselines.neural_free_viewpoint_relighting.training import Plan, Relighting
+from gibench.baselines.neural_free_viewpoint_relighting.training import Relighting, TrainingPlan
 from gibench.baselines.path_traced.tracer import GUIDES
 from gibench.baselines.sources import digest
 from gibench.baselines.stages import Stages
@@ -53,7 +53,7 @@ class NeuralRelighting(DirectLight):
         """Learn the scene. Returns seconds that were spent before."""
         views = training.views
         learned, judged = held_out(views, HELD_OUT, JUDGED)
-        plan = Plan.of(self.settings, training.seed, training.seconds)
+        plan = TrainingPlan.of(self.settings, training.seed, training.seconds)
         box = box_of(views, learned)
         examples, apart = (Examples(views, numbers, box, plan.faces) for numbers in (learned, judged))
         learner = Relighting(examples, apart, plan, torch_device())
@@ -73,7 +73,7 @@ class NeuralRelighting(DirectLight):
         super().prepare(site)
         if site.weights is None:
             raise MethodError("nfvr has not been trained: it needs the folder that `train` filled")
-        plan = Plan.of(self.settings, site.seed, None)
+        plan = TrainingPlan.of(self.settings, site.seed, None)
         self.network, self._faces = plan.network(), plan.faces
         with reading("the trained network", site.weights):
             weights, facts = artifacts.kept(site.weights)

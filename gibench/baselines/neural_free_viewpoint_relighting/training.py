@@ -54,7 +54,7 @@ JUDGED_PIXELS, JUDGED_WAVELETS = 512, 64
 
 
 @dataclass(frozen=True)
-class Plan:
+class TrainingPlan:
     """What decides a training, beside its frames.
 
     size, table, faces, encoding: of the network. pixels, learned: of a step. important: whether pixels are drawn where
@@ -72,9 +72,9 @@ class Plan:
     seconds: float | None
 
     @staticmethod
-    def of(settings: Mapping[str, Setting], seed: int, seconds: float | None) -> Plan:
+    def of(settings: Mapping[str, Setting], seed: int, seconds: float | None) -> TrainingPlan:
         """From the settings of the method."""
-        return Plan(
+        return TrainingPlan(
             {"full": FULL, "small": SMALL}[str(settings["network"])],
             int(settings["table"]),
             int(settings["faces"]),
@@ -95,7 +95,7 @@ class Plan:
 class Relighting(Learner):
     """The network of a scene."""
 
-    def __init__(self, examples: Examples, apart: Examples, plan: Plan, device: str = "cpu") -> None:
+    def __init__(self, examples: Examples, apart: Examples, plan: TrainingPlan, device: str = "cpu") -> None:
         """apart: what is held out."""
         self.examples, self.plan = examples, plan
         with seeded(plan.seed):

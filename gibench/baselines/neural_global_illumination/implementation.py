@@ -16,8 +16,8 @@ from gibench.baselines.neural_global_illumination.inputs import assembled
 from gibench.baselines.neural_global_illumination.network import NeuralGlobalIllumination
 from gibench.baselines.neural_global_illumination.training import (
     Examples,
-    Plan,
     Predicting,
+    TrainingPlan,
     facts_of,
     size_of,
 )
@@ -48,7 +48,7 @@ class NeuralLight:
         learned = [learned[k * len(learned) // count] for k in range(count)]
         frames = Frames(views, METHOD.channels, learned)
         measure = measured(frames)
-        plan = Plan.of(self.settings, training.seed, training.seconds)
+        plan = TrainingPlan.of(self.settings, training.seed, training.seconds)
         apart = Examples(Frames(views, METHOD.channels, judged), measure, self._lighting)
         learner = Predicting(
             Examples(frames, measure, self._lighting),

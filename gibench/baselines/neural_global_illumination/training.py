@@ -102,7 +102,7 @@ class Examples:
 
 
 @dataclass(frozen=True)
-class Plan:
+class TrainingPlan:
     """What decides a training, beside its frames. size: of the network. seconds: None for STEPS."""
 
     network: str
@@ -113,10 +113,12 @@ class Plan:
     seconds: float | None
 
     @staticmethod
-    def of(settings: Mapping[str, Setting], seed: int, seconds: float | None) -> Plan:
+    def of(settings: Mapping[str, Setting], seed: int, seconds: float | None) -> TrainingPlan:
         """From the settings of the method."""
         name = str(settings["network"])
-        return Plan(name, size_of(settings), bool(settings["lpips"]), int(settings["crop"]), seed, seconds)
+        return TrainingPlan(
+            name, size_of(settings), bool(settings["lpips"]), int(settings["crop"]), seed, seconds
+        )
 
 
 def size_of(settings: Mapping[str, Setting]) -> Size:
@@ -131,7 +133,7 @@ class Predicting(Learner):
     """The network of a room."""
 
     def __init__(
-        self, examples: Examples, judged: Sequence[Example], plan: Plan, device: str = "cpu"
+        self, examples: Examples, judged: Sequence[Example], plan: TrainingPlan, device: str = "cpu"
     ) -> None:
         """judged: what is held out. Raises WeightsError where LPIPS has none."""
         self.examples, self.plan = examples, plan

@@ -18,10 +18,10 @@ import numpy as np
 
 from gibench.baselines.first_hits import averaged
 from gibench.baselines.method import Prediction, Setting, Site, View
-from gibench.baselines.replay import Replay, camera_arrays, ray_generator
 from gibench.baselines.stages import Stages
 from gibench.rendering.denoise import denoise
 from gibench.rendering.integrator import trace_paths
+from gibench.rendering.replay import Replay, camera_arrays, ray_generator
 from gibench.rendering.sampling import IndependentSampler
 from gibench.rendering.scene import Scene
 

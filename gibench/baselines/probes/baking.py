@@ -25,12 +25,12 @@ from gibench.baselines.probes.adaptive.warp import Warp
 from gibench.baselines.probes.errors import ProbeError
 from gibench.baselines.probes.mappings import ADAPTIVE, MAPPINGS, LatLong, Octahedral
 from gibench.baselines.probes.narrowed import NarrowedMaterials
-from gibench.baselines.replay import Replay
 from gibench.datasets.exr import fits_half
 from gibench.rendering import surface
 from gibench.rendering.denoise import denoise
 from gibench.rendering.gbuffer import Hit
 from gibench.rendering.integrator import scatter_paths
+from gibench.rendering.replay import Replay
 from gibench.rendering.sampling import IndependentSampler
 from gibench.rendering.scene import Scene
 

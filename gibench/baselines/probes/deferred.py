@@ -16,8 +16,8 @@ from gibench.baselines.lightmap.lookup import Lightmap
 from gibench.baselines.method import Prediction, Setting, Site, View
 from gibench.baselines.probes.baking import ProbeSettings
 from gibench.baselines.probes.maps import Probes, load_probes
-from gibench.baselines.replay import Replay, camera_arrays, ray_generator
 from gibench.baselines.stages import Stages
+from gibench.rendering.replay import Replay, camera_arrays, ray_generator
 from gibench.rendering.scene import Scene
 
 

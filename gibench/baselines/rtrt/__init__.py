@@ -1,4 +1,4 @@
-"""Real-time ray tracing of glossy paths over a lightmap: the baseline of papers 000 and 002."""
+"""Real-time ray tracing of glossy paths over a lightmap: the baseline of Guo et al. 2022 and Rodriguez et al. 2020."""
 
 from __future__ import annotations
 

@@ -11,8 +11,8 @@ import mitsuba as mi
 from gibench.baselines.first_hits import hits_of_rays
 from gibench.baselines.lightmap.glossy_layer import GlossyLayer
 from gibench.baselines.method import View
-from gibench.baselines.replay import ray_generator
 from gibench.baselines.rtrt.glossy_paths import glossy_radiance
+from gibench.rendering.replay import ray_generator
 
 
 def _traced(scene, lightmap, camera, preliminary, seed, samples, bounces, width: int, height: int):

@@ -77,7 +77,7 @@ def batches(
     def begin(first: int) -> Iterator[Any]:
         loader = DataLoader(
             _Drawn(examples, seed, draw),
-            batch_sampler=_Order(len(examples), size, seed, first),
+            batch_sampler=_BatchSampler(len(examples), size, seed, first),
             num_workers=processes,
             prefetch_factor=ahead if processes else None,
             multiprocessing_context="spawn" if processes else None,
@@ -95,7 +95,7 @@ def _permutation(count: int, seed: int, number: int) -> Any:
     )
 
 
-class _Order:
+class _BatchSampler:
     """`order` as the sampler that a loader begins anew."""
 
     def __init__(self, *how: int) -> None:

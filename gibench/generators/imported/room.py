@@ -68,6 +68,11 @@ class ImportedRoom:
         """Name of the scene."""
         return self.scene.name
 
+    @property
+    def given_cameras(self) -> int:
+        """How many of the cameras are the scene's own."""
+        return len(self.scene.cameras)
+
 
 def import_room(
     scene: ImportedScene,

@@ -177,13 +177,8 @@ class Guide:
             direction = dr.select(entering, through, direction)
             ray = dr.select(entering, si.spawn_ray(direction), ray)
             delta &= entering ^ True
-            sky = dr.zeros(mi.SurfaceInteraction3f)
-            sky.wi = -direction
-            radiance = environment.eval(sky, entering)
             # One density for both ways to the environment.
-            outside = dr.zeros(mi.DirectionSample3f)
-            outside.d = direction
-            outside.emitter = environment
+            radiance, outside = self.portals.environment_from(direction, entering)
             of_environment = self.light_probability(row, self._number(environment, True), entering)
             density = dr.select(
                 entering, environment.pdf_direction(si, outside, entering) * of_environment, density

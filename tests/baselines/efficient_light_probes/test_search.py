@@ -17,8 +17,8 @@ from gibench.baselines.efficient_light_probes.search import (
     mirror_point,
     search,
 )
-from gibench.baselines.replay import camera_arrays
 from gibench.rendering.camera import PinholeCamera, RayGenerator
+from gibench.rendering.replay import camera_arrays
 from tests.baselines.probes.test_mappings import columns
 from tests.baselines.probes.test_maps import written
 

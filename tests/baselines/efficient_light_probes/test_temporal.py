@@ -6,8 +6,8 @@ import mitsuba as mi
 import numpy as np
 
 from gibench.baselines.efficient_light_probes.temporal import accumulated, reprojected
-from gibench.baselines.replay import camera_arrays
 from gibench.rendering.camera import PinholeCamera
+from gibench.rendering.replay import camera_arrays
 from tests.baselines.efficient_light_probes.test_search import SIZE, floor, rays, vectors
 
 NOW = PinholeCamera((0.3, -2.0, 2.5), (0.0, 0.2, 0.0), 1.0)

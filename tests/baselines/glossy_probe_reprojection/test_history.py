@@ -6,8 +6,8 @@ import mitsuba as mi
 import numpy as np
 
 from gibench.baselines.glossy_probe_reprojection.history import PastFrame, recalled
-from gibench.baselines.replay import camera_arrays
 from gibench.rendering.camera import PinholeCamera
+from gibench.rendering.replay import camera_arrays
 from tests.baselines.efficient_light_probes.test_search import floor, rays
 from tests.baselines.probes.test_mappings import columns
 

@@ -11,7 +11,7 @@ import torch
 from gibench.baselines.image_to_image import implementation
 from gibench.baselines.image_to_image.examples import READ, Draw, Examples, inputs_of
 from gibench.baselines.image_to_image.frames import Frames
-from gibench.baselines.image_to_image.learner import IndirectLight, Plan
+from gibench.baselines.image_to_image.learner import IndirectLight, TrainingPlan
 from gibench.baselines.image_to_image.shading import GEOMETRY, Inputs, indirect
 from gibench.baselines.method import MethodError, Training
 from gibench.baselines.stages import Stages
@@ -67,8 +67,8 @@ def test_variants_are_what_their_names_say():
     }
     assert made("gfa:normal").network().size.colours == 3
     assert made("gfa:one-head").network().size.heads == 1
-    assert not Plan.of(cards["gfa:no-perceptual"].settings(), 0).perceptual
-    assert not Plan.of(cards["gfa:no-adversarial"].settings(), 0).adversarial
+    assert not TrainingPlan.of(cards["gfa:no-perceptual"].settings(), 0).perceptual
+    assert not TrainingPlan.of(cards["gfa:no-adversarial"].settings(), 0).adversarial
 
 
 @pytest.fixture(scope="module")
@@ -113,7 +113,7 @@ def test_a_training_and_a_frame(room, weights, tmp_path):
 @pytest.mark.parametrize("name", NAMES)
 def test_a_step_of_each(views, name):
     frames = Examples(Frames(views, READ))
-    learner = IndirectLight(network(name), frames, frames, Plan(32, 2, True, True, 0))
+    learner = IndirectLight(network(name), frames, frames, TrainingPlan(32, 2, True, True, 0))
     before = learner.look()
     assert np.isfinite(before)
     batch = next(iter(learner.batches()(0)))
@@ -186,7 +186,7 @@ def test_from_the_file_to_radiance_colours_and_exposure_are_what_they_are(views,
 
 def test_frames_without_direct_light_teach_nothing(views):
     frames = Examples(Frames(views, READ))
-    learner = IndirectLight(network("bcn"), frames, frames, Plan(32, 1, False, False, 0))
+    learner = IndirectLight(network("bcn"), frames, frames, TrainingPlan(32, 1, False, False, 0))
     batch = next(iter(learner.batches()(0)))
     batch = {**batch, "direct": 0 * batch["direct"], "unit": 0 * batch["unit"]}
     losses = learner.step(batch, Step(0, 0.0, np.random.default_rng(0)))

@@ -9,7 +9,7 @@ import pytest
 from gibench.baselines.linearly_transformed_cosines.fitting import fitted, lobes, share_above
 from gibench.baselines.linearly_transformed_cosines.polygons import above_horizon, form_factor, outline
 from gibench.baselines.linearly_transformed_cosines.rectangle import cosine_density
-from gibench.baselines.linearly_transformed_cosines.table import Table, alphas, cosines, table
+from gibench.baselines.linearly_transformed_cosines.table import TransformTable, alphas, cosines, table
 from gibench.rendering.lighting import AreaLight
 
 POINTS = 160
@@ -121,7 +121,7 @@ def test_lobes_are_as_they_are_integrated(alpha, degrees, bound):
     beside = [(-np.sin(a) * np.cos(0.5), np.sin(a) * np.sin(0.5), np.cos(a)) for a in angles]
     for side in (0.4, 3.0):
         lights = [light(2 * np.array(place), width=side, height=side) for place in (*mirrored, *beside)]
-        transform = Table().transform(mi.Float(alpha), mi.Float(float(view[2])))
+        transform = TransformTable().transform(mi.Float(alpha), mi.Float(float(view[2])))
         edges = [edge.mapped(transform.inverse) for edge in above_horizon(outlines(lights))]
         found = np.array(form_factor(edges) * transform.share)
         expected = np.array([summed(corners, ggx(alpha, view[2])) for corners in lights])
@@ -133,7 +133,7 @@ def test_no_lobe_reflects_more_than_it_is_given():
     share, grazing = table()[..., 4], table()[..., 5]
     assert np.isfinite(table()).all()
     for row, alpha in enumerate(alphas()):
-        transform = Table().transform(
+        transform = TransformTable().transform(
             mi.Float(alpha.astype(np.float32)), mi.Float(cosines().astype(np.float32))
         )
         part = [
@@ -157,7 +157,7 @@ def test_densities_integrate_to_what_is_above():
         *(part.astype(np.float32) for part in (level * np.cos(turn), level * np.sin(turn), z))
     )
     for alpha, cosine in ((0.3, 0.9), (0.5, 0.3), (1.0, 0.1)):
-        transform = Table().transform(mi.Float(alpha), mi.Float(cosine))
+        transform = TransformTable().transform(mi.Float(alpha), mi.Float(cosine))
         parameters = np.array([transform.m11[0], transform.m22[0], transform.m13[0]])
         angle = float(np.arctan2(transform.sine[0], transform.cosine[0]))
         mean = 2 * np.pi * np.array(cosine_density(transform, directions)).mean()

@@ -12,7 +12,7 @@ from gibench.baselines.method import MethodError, View
 from gibench.baselines.neural_free_viewpoint_relighting import METHOD
 from gibench.baselines.neural_free_viewpoint_relighting.implementation import NeuralRelighting
 from gibench.baselines.neural_free_viewpoint_relighting.inputs import Box
-from gibench.baselines.neural_free_viewpoint_relighting.training import Plan
+from gibench.baselines.neural_free_viewpoint_relighting.training import TrainingPlan
 from gibench.baselines.stages import Stages
 from gibench.baselines.training.artifacts import RECORD, WEIGHTS
 from gibench.baselines.training.files import write_tensors
@@ -38,7 +38,7 @@ def weights(tmp_path_factory):
     """Of a network that has learned nothing."""
     folder = tmp_path_factory.mktemp("weights")
     torch.manual_seed(0)
-    network = Plan.of(METHOD.settings(SMALL), 0, None).network()
+    network = TrainingPlan.of(METHOD.settings(SMALL), 0, None).network()
     facts = Box((-1.5, -1.5, 0.0), (3.0, 3.0, 2.0)).facts()
     write_tensors(folder / WEIGHTS, {"weights": {"network": network.state_dict()}, "facts": facts})
     (folder / RECORD).write_text("{}")

@@ -9,7 +9,7 @@ import torch
 
 from gibench.baselines.neural_free_viewpoint_relighting import METHOD
 from gibench.baselines.neural_free_viewpoint_relighting.network import FULL
-from gibench.baselines.neural_free_viewpoint_relighting.training import Plan, Relighting
+from gibench.baselines.neural_free_viewpoint_relighting.training import Relighting, TrainingPlan
 from gibench.baselines.training.batches import batches
 from gibench.baselines.training.budget import Budget
 from gibench.baselines.training.checkpoints import Checkpoint
@@ -21,7 +21,7 @@ SMALL = {"network": "small", "faces": 16, "table": 12, "batch": 64, "learned": 1
 
 def plan(**settings):
     return dataclasses.replace(
-        Plan.of(METHOD.settings({**SMALL, **settings}), seed=3, seconds=1.0), faces=FACES
+        TrainingPlan.of(METHOD.settings({**SMALL, **settings}), seed=3, seconds=1.0), faces=FACES
     )
 
 
@@ -68,6 +68,6 @@ def test_variants_are_what_they_say(variant):
 
 
 def test_the_defaults_are_those_of_the_paper():
-    made = Plan.of(METHOD.settings(), seed=0, seconds=None)
+    made = TrainingPlan.of(METHOD.settings(), seed=0, seconds=None)
     assert (made.size, made.table, made.faces) == (FULL, 19, 64)
     assert (made.pixels, made.learned, made.important, made.encoding) == (2048, 300, True, True)

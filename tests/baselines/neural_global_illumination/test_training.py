@@ -8,7 +8,7 @@ import torch
 from gibench.baselines.moving_light.measure import CODE
 from gibench.baselines.neural_global_illumination import METHOD
 from gibench.baselines.neural_global_illumination.network import SMALL, NeuralGlobalIllumination
-from gibench.baselines.neural_global_illumination.training import Example, Plan, Predicting, size_of
+from gibench.baselines.neural_global_illumination.training import Example, Predicting, TrainingPlan, size_of
 from gibench.baselines.training.batches import batches
 from gibench.baselines.training.budget import Budget
 from gibench.baselines.training.learner import Step
@@ -37,7 +37,7 @@ class Made:
 
 
 def plan(**settings):
-    return Plan.of(METHOD.settings({"network": "small", "crop": 32, **settings}), seed=3, seconds=1.0)
+    return TrainingPlan.of(METHOD.settings({"network": "small", "crop": 32, **settings}), seed=3, seconds=1.0)
 
 
 def learner(**settings):

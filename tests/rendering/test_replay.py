@@ -12,9 +12,9 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from gibench.baselines.replay import Replay, ReplayError, arrays_of, camera_arrays, ray_generator
 from gibench.rendering.camera import PinholeCamera, RayGenerator
 from gibench.rendering.light_rig import LightRig
+from gibench.rendering.replay import Replay, ReplayError, arrays_of, camera_arrays, ray_generator
 from gibench.rendering.scene import load_dict
 from tests.rendering import scenes
 
