@@ -96,6 +96,11 @@ def per_radiance(light: Tensor, area: AreaLight) -> Tensor:
     return torch.where(unit > 0, light / torch.where(unit > 0, unit, 1), 0)
 
 
+def per_flux(light: Tensor, area: AreaLight) -> Tensor:
+    """Radiance (3, H, W) in units of the light's radiance times its area: networks are not told how large it is."""
+    return per_radiance(light, area) / area.area
+
+
 def area_of(frames: Frames, index: int) -> AreaLight:
     """The light of a frame. Raises TrainingError where no area light lights it."""
     row = {str(name): value for name, value in frames.rows.iloc[index].items()}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -13,6 +12,7 @@ from torch import Tensor
 
 from gibench.baselines.image_to_image.frames import Frames
 from gibench.baselines.method import Setting
+from gibench.baselines.moving_light.kept import KeptExamples
 from gibench.baselines.moving_light.measure import CODE, Measure, area_of, per_radiance
 from gibench.baselines.neural_global_illumination.inputs import assembled
 from gibench.baselines.neural_global_illumination.network import FULL, SMALL, NeuralGlobalIllumination, Size
@@ -49,9 +49,6 @@ PERCEPTUAL_FROM, PERCEPTUAL_EVERY, PERCEPTUAL_SIDE = 0.8, 4, 64
 """Share of the training after which LPIPS is looked at, steps from one look to the next, each with as much more weight,
 and pixels along a side: VGG16 costs more than the small network, and the paper's order is not said."""
 
-KEPT = 1 << 30
-"""Bytes of examples that are kept in memory, in half precision, so that no frame is read and put together twice."""
-
 
 class Example(NamedTuple):
     """A frame. inputs: (34, H, W). code: of indirect radiance, rest: all other light as it is shown, (3, H, W).
@@ -65,32 +62,16 @@ class Example(NamedTuple):
     shown: Tensor
 
 
-class Examples:
+class Examples(KeptExamples[Example]):
     """Frames of a room as examples, by number."""
 
     def __init__(self, frames: Frames, measure: Measure, lighting: str) -> None:
         """lighting: one of `inputs.LIGHTING`."""
         self.frames, self.measure, self.lighting = frames, measure, lighting
-        self._kept: OrderedDict[int, Example] = OrderedDict()
-        self._bytes = 0
+        super().__init__(len(frames))
 
-    def __len__(self) -> int:
-        """How many."""
-        return len(self.frames)
-
-    def __getitem__(self, index: int) -> Example:
-        """Read one, or take it from memory."""
-        if index not in self._kept:
-            example = self._made(index)
-            halves = Example(example.inputs.half(), example.code.half(), example.rest.half(), example.shown)
-            size = sum(part.numel() * part.element_size() for part in halves)
-            if self._bytes + size > KEPT:
-                return example
-            self._kept[index] = halves
-            self._bytes += size
-        return Example(*(part.float() for part in self._kept[index]))
-
-    def _made(self, index: int) -> Example:
+    def made(self, index: int) -> Example:
+        """Read one."""
         images, area = self.frames[index], area_of(self.frames, index)
         indirect = images["indirect_diffuse"] + images["indirect_specular"]
         inputs = assembled(images, self.frames.camera(index), area, self.measure, self.lighting)

@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from gibench.baselines.image_to_image.frames import Frames, Images
-from gibench.baselines.moving_light.measure import CODE, Measure, area_of, per_radiance, unit_vectors
+from gibench.baselines.moving_light.measure import CODE, Measure, area_of, per_flux, unit_vectors
 from gibench.baselines.radiance_regression.network import CellNetworks
 from gibench.baselines.radiance_regression.partition import Pairs, Partition, partitioned
 from gibench.baselines.training.budget import Budget
@@ -64,11 +64,6 @@ def described(
     parts = [images["normal"], unit_vectors(eye - place), measure.inside(centre)]
     parts += [images[name] for name in ("albedo", "specular_albedo", "roughness")]
     return place, torch.cat(parts)
-
-
-def per_flux(light: Tensor, area: AreaLight) -> Tensor:
-    """Radiance (3, H, W) in units of the light's radiance times its area: networks are not told how large it is."""
-    return per_radiance(light, area) / area.area
 
 
 def points_of(frames: Frames, index: int, measure: Measure, most: int, seed: int) -> Points:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 import torch
 
-from gibench.baselines.moving_light.measure import CODE, Measure
+from gibench.baselines.moving_light.measure import CODE, Measure, per_flux
 from gibench.baselines.radiance_regression import training
 from gibench.baselines.radiance_regression.network import CellNetworks, parameters_of_a_cell
 from gibench.baselines.radiance_regression.partition import Partition, partitioned
@@ -14,7 +14,6 @@ from gibench.baselines.radiance_regression.training import (
     Regressing,
     described,
     inputs_of,
-    per_flux,
     predicted,
 )
 from gibench.baselines.training.budget import Budget
