@@ -17,7 +17,6 @@ from functools import cache, cached_property
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from xml.etree import ElementTree
 
 from gibench import gate
 from gibench.benchmarks.errors import ResultsError
@@ -25,6 +24,7 @@ from gibench.datasets.errors import DatasetError
 from gibench.datasets.exr import decode
 from gibench.datasets.loading import Frame, open_dataset
 from gibench.datasets.manifest import recipe_of, room_record
+from gibench.datasets.room_view import check_scene_file
 
 if TYPE_CHECKING:
     from gibench.datasets.recipes import Recipe
@@ -172,16 +172,9 @@ def refuse_files_outside(root: Path, scene: SceneFiles) -> None:
 
     root: of the dataset. Raises ResultsError.
     """
-    folder = scene.folder.relative_to(root)
     try:
-        content = gate.read_inside(root, folder / "scene.xml")
-        for node in ElementTree.fromstring(content).iter():
-            if node.tag in ("include", "path"):
-                raise gate.GateError(f"it holds <{node.tag}>, which no room does")
-            named = [node.get("filename")] + [node.get("value")] * (node.get("name") == "filename")
-            for name in filter(None, named):
-                gate.inside(scene.folder, name)
-    except (gate.GateError, ElementTree.ParseError) as problem:
+        check_scene_file(root, scene.folder)
+    except gate.GateError as problem:
         raise ResultsError(f"{scene.folder / 'scene.xml'} is not read: {problem}") from None
 
 

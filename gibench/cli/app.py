@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from gibench.cli import bench, convert, dataset, doctor, environments, exporting, gallery, stress
+from gibench.cli import bench, convert, dataset, doctor, environments, exporting, gallery, noise, stress
 
 app = typer.Typer(
     name="gibench",
@@ -19,6 +19,7 @@ app.command("convert")(convert.convert)
 app.command("doctor")(doctor.doctor)
 app.command("environments")(environments.environments)
 app.command("gallery")(gallery.gallery)
+app.command("noise")(noise.noise)
 app.command("stress")(stress.stress)
 
 make_app = typer.Typer(name="make-dataset", add_completion=False, pretty_exceptions_enable=False)

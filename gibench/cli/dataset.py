@@ -131,7 +131,7 @@ def make(
         "rooms": rooms,
         "seed": seed,
         "views": views,
-        "resolution": None if resolution is None else _resolution(resolution),
+        "resolution": None if resolution is None else resolution_of(resolution),
         "spp": spp,
         "error": error,
         "channels": None if channels is None else names_in(channels, "--channels"),
@@ -315,7 +315,8 @@ def check_variant(variant: str) -> None:
         raise _usage(f"--variant: no variant '{variant}'; {nearest(variant, ('auto', *VARIANTS))}")
 
 
-def _resolution(text: str) -> tuple[int, int]:
+def resolution_of(text: str) -> tuple[int, int]:
+    """Width and height, as an option gives them."""
     match = re.fullmatch(r"(\d{1,6})[x×](\d{1,6})", text.strip().lower())
     if match is None:
         raise _usage(f"--resolution: '{text}' is no resolution; write WIDTHxHEIGHT, like 256x192")

@@ -59,6 +59,11 @@ def group_levels(spp: int) -> int:
     return next(fits, 0)
 
 
+def block_seed(seed: int, samples: int, first_pixel: int) -> int:
+    """Seed of the paths of a block of pixels, after so many samples a pixel."""
+    return int(np.random.SeedSequence(seed, spawn_key=(samples, first_pixel)).generate_state(1)[0])
+
+
 @dataclass
 class Estimate:
     """Running means over (H·W) pixels, in float64, from groups of 4^levels samples.
@@ -274,7 +279,7 @@ def _add(
     camera: PinholeCamera,
     resolution: tuple[int, int],
     samples: int,
-    seed: np.random.SeedSequence,
+    seed: int,
     max_depth: int,
     guides: bool,
 ) -> None:
@@ -287,9 +292,7 @@ def _add(
     for first in range(0, estimate.pixels, pixels):
         count = min(pixels, estimate.pixels - first)
         where = slice(first, first + count)
-        number = int(
-            np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, first)).generate_state(1)[0]
-        )
+        number = block_seed(seed, estimate.spp, first)
         start = time.perf_counter()
         block = _Block(resolution[0], first, count, samples, estimate.levels, number, max_depth, guides)
         with tracing():
@@ -344,8 +347,7 @@ def estimate_radiance(
     goal = spp if spp is not None else spp_cap - spp_cap % ROUND
     while estimate.spp < goal:
         samples = min(ROUND, goal - estimate.spp)
-        lane_seed = np.random.SeedSequence(seed, spawn_key=(estimate.spp,))
-        _add(estimate, scene, camera, resolution, samples, lane_seed, max_depth, guides)
+        _add(estimate, scene, camera, resolution, samples, seed, max_depth, guides)
         if error is not None and estimate.median_error < error:
             break
     return estimate

@@ -13,14 +13,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, Protocol
 
 import drjit as dr
 import mitsuba as mi
 
 from gibench.rendering import flags
 from gibench.rendering.backend import is_scalar
-from gibench.rendering.light_sampling import emission, emission_weight, inverse, mis_weight, sample_light
+from gibench.rendering.light_sampling import (
+    LightSample,
+    emission,
+    emission_weight,
+    inverse,
+    mis_weight,
+    sample_light,
+)
 from gibench.rendering.lobes import diffuse_lobe, split
 
 RR_DEPTH = 2
@@ -63,17 +70,17 @@ def shading_normal(si):
 
 
 @dataclass
-class _Scattering:
+class Scattering:
     """What a vertex reflects of a light, and how the path goes on from it.
 
-    light: number of the light that was asked, where a guide has chosen it. to_light: unit, in the frame of the vertex;
-    lit: whether there is light from there. incident: its radiance over density, with its MIS weight; value: of the BSDF
-    for it, cosine included; both 0 where there is none. direction: of the bounce, world space. weight: BSDF value over
-    density. expected: the same as the BSDF alone would sample it. pdf: per steradian. delta: whether the lobe is. eta:
-    relative index of refraction.
+    light: the sample of a light. to_light: its direction, in the frame of the vertex; lit: whether there is light from
+    there. incident: its radiance over density, with its MIS weight; value: of the BSDF for it, cosine included; both 0
+    where there is none. direction: of the bounce, world space. weight: BSDF value over density. expected: the same as
+    the BSDF alone would sample it. pdf: per steradian. delta: whether the lobe is. eta: relative index of refraction.
+    guided: whether a guide has chosen the direction.
     """
 
-    light: Any
+    light: LightSample
     to_light: Any
     lit: Any
     incident: Any
@@ -84,6 +91,53 @@ class _Scattering:
     pdf: Any
     delta: Any
     eta: Any
+    guided: Any
+
+
+class Recorder(Protocol):
+    """Told of the vertices of paths while a kernel is traced. Values are per unit of throughput at the path's start."""
+
+    def met(self, emitter: Any, emitted: Any, depth: Any, active: Any) -> None:
+        """A ray has met an emitter (pointer) after `depth` scattering events. emitted: weighted radiance."""
+
+    def vertex(
+        self,
+        row: Any,
+        si: Any,
+        bsdf: Any,
+        scattering: Scattering,
+        throughput: Any,
+        before: Any,
+        depth: Any,
+        active: Any,
+    ) -> None:
+        """A path is scattered.
+
+        row: of the guide. throughput: up to the vertex; before: radiance found up to it, that of its light sample
+        included. depth: scattering events, this one included.
+        """
+
+
+class PathRecorder(Recorder, Protocol):
+    """Told of the first two events too, in `scatter_paths` and `trace_paths`."""
+
+    def seen(self, emitter: Any, emitted: Any) -> None:
+        """The camera's ray has met an emitter (pointer)."""
+
+    def first(
+        self,
+        si: Any,
+        bsdf: Any,
+        scattering: Scattering,
+        lit: tuple[Any, Any],
+        weights: tuple[Any, Any],
+        active: Any,
+    ) -> None:
+        """A path is scattered first.
+
+        lit: radiance of the light sample that is reflected by the diffuse lobe, and by all others; weights: with which
+        these lobes reflect the rest of the path.
+        """
 
 
 def _guide_row(guide, si, sampler, active):
@@ -91,7 +145,7 @@ def _guide_row(guide, si, sampler, active):
     return mi.UInt32(0) if guide is None else guide.row(si, sampler, active)
 
 
-def _scatter(scene, portals, guide, context, si, bsdf, row, sampler, active) -> _Scattering:
+def _scatter(scene, portals, guide, context, si, bsdf, row, sampler, active) -> Scattering:
     """A sample of the lights and one of the next direction, by one evaluation of the BSDF: kernels stay small.
 
     context: of the lobes that are asked for. row: of the guide at si.
@@ -107,17 +161,17 @@ def _scatter(scene, portals, guide, context, si, bsdf, row, sampler, active) -> 
     expected = dr.select(dr.max(weight) > 0, weight, 1)
     if guide is None:
         direction, pdf, eta = si.to_world(bounce.wo), bounce.pdf, bounce.eta
-        delta = mi.has_flag(bounce.sampled_type, mi.BSDFFlags.Delta)
+        delta, guided = mi.has_flag(bounce.sampled_type, mi.BSDFFlags.Delta), mi.Bool(False)
     else:
         fraction = guide.fraction(row, bsdf, active)
         light_bounce_pdf = guide.mixed_density(row, fraction, light.direction, light_bounce_pdf, lit)
-        direction, weight, pdf, delta, eta = guide.bounce(
+        direction, weight, pdf, delta, eta, guided = guide.bounce(
             context, si, bsdf, row, fraction, bounce, weight, sampler, active
         )
     mis = dr.select(light.delta, 1, mis_weight(light.pdf, light_bounce_pdf))
     incident, value = dr.select(lit, light.weight * mis, 0), dr.select(lit, value, 0)
-    return _Scattering(
-        light.light, to_light, lit, incident, value, direction, weight, expected, pdf, delta, eta
+    return Scattering(
+        light, to_light, lit, incident, value, direction, weight, expected, pdf, delta, eta, guided
     )
 
 
@@ -162,6 +216,8 @@ def _follow(
         # Emission at this vertex, weighted against the light sampling of the vertex before it.
         weight = emission_weight(scene, portals, guide, si, reference, row, pdf, delta, active)
         emitted = throughput * emission(scene, si, active) * weight
+        if dr.hint(recorder is not None, mode="scalar"):
+            recorder.met(si.emitter(scene), emitted, depth, active)
         first_emission += dr.select(first, emitted, 0)
         scattered += dr.select(first, 0, emitted)
         first = mi.Bool(False)
@@ -181,13 +237,9 @@ def _follow(
                 row,
                 si,
                 bsdf,
-                scattering.direction,
-                pdf,
-                delta,
+                scattering,
                 throughput,
                 first_emission + scattered,
-                scattering.light,
-                reflected,
                 depth,
                 active,
             )
@@ -213,7 +265,7 @@ def _follow(
 def follow_paths(scene, sampler, ray, *, max_depth: int, portals=None, guide=None, recorder=None):
     """Light along rays, one path each: emission at the first hit, and all that it reflects (two mi.Color3f).
 
-    sampler: independent. recorder: told of every vertex that scatters, see `guiding.learning`.
+    sampler: independent. recorder: a `Recorder`.
     """
     nowhere = dr.zeros(mi.Interaction3f)
     start = {
@@ -240,14 +292,15 @@ def scatter_paths(
     portals: Any = None,
     layers: Any = None,
     guide: Any = None,
+    recorder: Any = None,
 ) -> PathSample:
     """Traces one path a lane from points that light is reflected at, and sorts what they send along si.wi.
 
     scene: mitsuba.Scene. sampler: from `sampling`. si: mi.SurfaceInteraction3f, bsdf: its material. max_depth: largest
     number of scattering events, that at si included. lobes: "all"; "diffuse" or "specular" reflect by that lobe
     alone, with all samples, and leave the other at 0. portals: `Scene.portals`, for less noise by daylight. layers:
-    `Scene.layers`, without which all of `principled` counts as diffuse. guide: `Scene.guide`, for less noise. emission
-    of the result is 0.
+    `Scene.layers`, without which all of `principled` counts as diffuse. guide: `Scene.guide`, for less noise.
+    recorder: a `PathRecorder`, or None. emission of the result is 0.
     """
     by_hand = layers is not None and (layers.principled or layers.masked)
     mask = {"all": flags.ALL_LOBES, "diffuse": flags.DIFFUSE, "specular": flags.NOT_DIFFUSE}[lobes]
@@ -278,13 +331,22 @@ def scatter_paths(
         value_diffuse, value_other, weight_diffuse, weight_other = value, none, weight, none
     else:
         value_diffuse, value_other, weight_diffuse, weight_other = none, value, none, weight
+    if recorder is not None:
+        recorder.first(
+            si,
+            bsdf,
+            scattering,
+            (incident * value_diffuse, incident * value_other),
+            (weight_diffuse, weight_other),
+            active,
+        )
     active &= dr.max(weight) > 0
 
     direct, indirect = _follow(
         scene,
         portals,
         guide,
-        None,
+        recorder,
         sampler.independent,
         si.spawn_ray(scattering.direction),
         mi.Interaction3f(si),
@@ -316,12 +378,13 @@ def trace_paths(
     portals: Any = None,
     layers: Any = None,
     guide: Any = None,
+    recorder: Any = None,
 ) -> PathSample:
     """Traces one path a lane and sorts its radiance.
 
     scene: mitsuba.Scene. sampler: from `sampling`. ray: mi.Ray3f. max_depth: largest number of scattering events, ≥ 0
     (Mitsuba's `path` counts segments: its max_depth is one more). guides: whether first-hit albedo and normal are
-    returned too. portals, layers, guide: those of the `Scene`, as for `scatter_paths`.
+    returned too. portals, layers, guide: those of the `Scene`, recorder: as for `scatter_paths`.
     """
     si = scene.ray_intersect(ray, mi.RayFlags.All, True)
     bsdf = bsdf_at(si, ray)
@@ -335,8 +398,11 @@ def trace_paths(
         portals=portals,
         layers=layers,
         guide=guide,
+        recorder=recorder,
     )
     result.emission = emission(scene, si, True)
+    if recorder is not None:
+        recorder.seen(si.emitter(scene), result.emission)
     if guides:
         # On a conductor this is a value of its lobe and may exceed 1; the denoiser wants [0, 1].
         result.albedo = dr.select(si.is_valid(), dr.clip(bsdf.eval_diffuse_reflectance(si), 0, 1), 0)

@@ -34,14 +34,16 @@ class LightSample:
     """A direction to a light that the vertex sees.
 
     direction: unit, world space. pdf: density per steradian, 0 where there is no light. delta: whether the light is a
-    point or a single direction, which no bounce meets. weight: radiance over density. light: number of the light, where
-    a guide has chosen it.
+    point or a single direction, which no bounce meets. weight: radiance over density. emitter: pointer to the light.
+    entering: whether it was found through a portal. light: number of the light, where a guide has chosen it.
     """
 
     direction: Any
     pdf: Any
     delta: Any
     weight: Any
+    emitter: Any
+    entering: Any
     light: Any = None
 
 
@@ -74,11 +76,11 @@ def emission_weight(scene, portals, guide, si, reference, row, pdf, delta, activ
 def sample_light(scene, portals, guide, si, row, sampler, active) -> LightSample:
     """Samples a light from si: of all alike, through the portals, or as the guide has it for its row."""
     if guide is not None:
-        return LightSample(*guide.sample_light(scene, si, row, sampler, active))
+        return guide.sample_light(scene, si, row, sampler, active)
     u = sampler.next_2d()
     if portals is None:
         sample, weight = scene.sample_emitter_direction(si, u, True, active)
-        return LightSample(sample.d, sample.pdf, sample.delta, weight)
+        return LightSample(sample.d, sample.pdf, sample.delta, weight, sample.emitter, mi.Bool(False))
     fraction = portals.fraction
     entering = active & (u.x < fraction)
     u = mi.Point2f(dr.select(entering, u.x / fraction, (u.x - fraction) / (1 - fraction)), u.y)
@@ -101,5 +103,10 @@ def sample_light(scene, portals, guide, si, row, sampler, active) -> LightSample
     chosen = active & (mixed > 0) & (entering | (sample.pdf > 0))
     chosen &= scene.ray_test(ray, chosen) ^ True
     return LightSample(
-        direction, dr.select(chosen, mixed, 0), delta, dr.select(chosen, radiance * inverse(mixed), 0)
+        direction,
+        dr.select(chosen, mixed, 0),
+        delta,
+        dr.select(chosen, radiance * inverse(mixed), 0),
+        dr.select(entering, portals.environment, sample.emitter),
+        entering,
     )

@@ -11,11 +11,11 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from gibench.rendering.backend import registry_key
 from gibench.rendering.guiding.alias import alias_tables, pick
 from gibench.rendering.guiding.directions import BINS, bin_of, direction_in
 from gibench.rendering.guiding.grid import Grid
-from gibench.rendering.light_sampling import inverse
+from gibench.rendering.light_numbers import keys_of, light_numbers, lights_of, number_of
+from gibench.rendering.light_sampling import LightSample, inverse
 
 
 @dataclass(frozen=True)
@@ -33,15 +33,6 @@ class Distributions:
     fraction: NDArray[np.float64]
 
 
-def lights_of(mi_scene: Any) -> list[Any]:
-    """The emitters of a scene, in an order that does not depend on how it was loaded."""
-    shapes = sorted((s for s in mi_scene.shapes() if s.is_emitter()), key=lambda s: s.id())
-    on_shapes = [shape.emitter() for shape in shapes]
-    known = {registry_key("EmitterPtr", emitter) for emitter in on_shapes}
-    others = [e for e in mi_scene.emitters() if registry_key("EmitterPtr", e) not in known]
-    return [*on_shapes, *sorted(others, key=lambda e: e.id())]
-
-
 class Guide:
     """Chooses lights and directions for paths.
 
@@ -53,15 +44,12 @@ class Guide:
         """portals: `Portals` that light comes in by, or None. Under a vectorised variant, with at least one light."""
         self.grid, self.portals = grid, portals
         emitters = lights_of(mi_scene)
-        keys = [registry_key("EmitterPtr", emitter) for emitter in emitters]
-        numbers = np.zeros(max(keys) + 1, dtype=np.uint32)
-        numbers[keys] = np.arange(len(keys))
         light_table, light_probability = alias_tables(learned.lights)
         table, probability = alias_tables(learned.directions)
-        self._emitters = dr.reinterpret_array(mi.EmitterPtr, mi.UInt32(np.array(keys, dtype=np.uint32)))
-        self._numbers = mi.UInt32(numbers)
+        self._emitters = dr.reinterpret_array(mi.EmitterPtr, mi.UInt32(keys_of(emitters)))
+        self._numbers = light_numbers(emitters)
         self._lights = mi.UInt32(learned.lights.shape[1])
-        self._portal_light = mi.UInt32(len(keys))
+        self._portal_light = mi.UInt32(len(emitters))
         self._rows = mi.UInt32(learned.rows)
         self._fraction = mi.Float(learned.fraction)
         self._light_table = mi.UInt32(light_table.ravel())
@@ -107,7 +95,7 @@ class Guide:
         """The next direction: the BSDF's sample, or the guide's in its place (one-sample MIS, Veach 1997, 9.2.4).
 
         sampled, weight: of the BSDF. Returns the direction (world), the weight (BSDF value over density), the density,
-        whether it is a delta lobe's, and the relative index of refraction.
+        whether it is a delta lobe's, the relative index of refraction, and whether the guide has chosen it.
         """
         guided = active & (sampler.next_1d() < fraction)
         item = pick(self._table, row, mi.UInt32(BINS), sampler.next_1d(), guided)
@@ -128,6 +116,7 @@ class Guide:
             dr.select(alone, sampled.pdf, mixed),
             delta,
             dr.select(guided, 1, sampled.eta),
+            guided,
         )
 
     def light_probability(self, row, light, active):
@@ -135,7 +124,7 @@ class Guide:
         return dr.gather(mi.Float, self._light_probability, row * self._lights + light, active)
 
     def _number(self, emitter, active):
-        return dr.gather(mi.UInt32, self._numbers, dr.reinterpret_array(mi.UInt32, emitter), active)
+        return number_of(self._numbers, emitter, active)
 
     def _through_portals(self, reference, row, direction, active):
         density = self.portals.density(reference.p, direction)
@@ -156,11 +145,7 @@ class Guide:
         )
 
     def sample_light(self, scene, si, row, sampler, active):
-        """Samples a light that si sees.
-
-        Returns the direction, its density per steradian (0 where there is none), whether it is a delta light's,
-        radiance over density, and the number of the light.
-        """
+        """A `LightSample` of a light that si sees."""
         light = pick(self._light_table, row, self._lights, sampler.next_1d(), active)
         u = sampler.next_2d()
         entering = mi.Bool(False) if self.portals is None else active & (light == self._portal_light)
@@ -193,4 +178,12 @@ class Guide:
             weight *= inverse(chosen)
         found = active & (density > 0) & dr.isfinite(density) & (entering | (sample.pdf > 0))
         found &= scene.ray_test(ray, found) ^ True
-        return direction, dr.select(found, density, 0), delta, dr.select(found, weight, 0), light
+        return LightSample(
+            direction,
+            dr.select(found, density, 0),
+            delta,
+            dr.select(found, weight, 0),
+            emitter if self.portals is None else dr.select(entering, self.portals.environment, emitter),
+            entering,
+            light,
+        )

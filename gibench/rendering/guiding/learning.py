@@ -19,8 +19,9 @@ from gibench.rendering.backend import is_scalar, tracing
 from gibench.rendering.free_space import NoFreeSpace, beginnings, free_space, surroundings
 from gibench.rendering.guiding.directions import BINS, bin_of
 from gibench.rendering.guiding.grid import FACES, Grid
-from gibench.rendering.guiding.guide import Distributions, Guide, lights_of
+from gibench.rendering.guiding.guide import Distributions, Guide
 from gibench.rendering.integrator import follow_paths
+from gibench.rendering.light_numbers import lights_of
 from gibench.rendering.sampling import IndependentSampler
 
 SEED = 0
@@ -78,24 +79,25 @@ class Recorder:
         self.arrays += [self.density, self.throughput, self.before, self.lit]
         dr.eval(self.arrays)
 
-    def vertex(self, row, si, bsdf, direction, pdf, delta, throughput, before, light, lit, depth, active):
-        """Called by the integrator at each vertex that scatters.
+    def met(self, emitter, emitted, depth, active):
+        """Part of what is found `before` the next vertex."""
 
-        direction: of the bounce, of this density. throughput: up to the vertex; before: radiance found up to it, what
-        the light gives it included. light: number of the light that was asked; lit: reflected radiance that it gives.
-        """
+    def vertex(self, row, si, bsdf, scattering, throughput, before, depth, active):
+        """See `integrator.Recorder`."""
+        light = scattering.light.light
         normal = dr.mulsign(si.n, dr.dot(si.n, si.to_world(si.wi)))
         place, inside = self._grid.place(si.p, normal, mi.Vector3f(0))
         slot = self._lane + (depth - 1) * self._lanes
         active = active & inside & (depth <= DEPTH)
-        diffuse = mi.has_flag(bsdf.flags(), mi.BSDFFlags.DiffuseReflection) & (delta ^ True)
+        diffuse = mi.has_flag(bsdf.flags(), mi.BSDFFlags.DiffuseReflection) & (scattering.delta ^ True)
         dr.scatter(self.place, place, slot, active)
-        dr.scatter(self.direction, bin_of(direction), slot, active & diffuse)
-        dr.scatter(self.density, pdf, slot, active)
+        dr.scatter(self.direction, bin_of(scattering.direction), slot, active & diffuse)
+        dr.scatter(self.density, scattering.pdf, slot, active)
         dr.scatter(self.throughput, dr.mean(throughput), slot, active)
         dr.scatter(self.before, dr.mean(before), slot, active)
         dr.scatter(self.light, light, slot, active)
-        dr.scatter(self.lit, dr.mean(lit) * self._guide.light_probability(row, light, active), slot, active)
+        chosen = self._guide.light_probability(row, light, active)
+        dr.scatter(self.lit, dr.mean(scattering.value * scattering.incident) * chosen, slot, active)
 
 
 @dataclass
