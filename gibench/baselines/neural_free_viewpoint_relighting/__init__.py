@@ -3,15 +3,7 @@
 from __future__ import annotations
 
 from gibench.baselines.method import Knob, Method, Variant
-
-SURFACE = ("position", "normal", "albedo", "specular_albedo", "roughness")
-"""Channels of what is seen, that the network is given."""
-
-DENOISED = (
-    Knob("spp", 16, (1, 2, 4, 8, 16, 32), "paths a pixel of direct light, which is always denoised"),
-    Knob("denoise", True, (False, True), "whether Open Image Denoise sees indirect light too"),
-)
-"""Of all methods whose direct light is path traced and whose indirect light is a network's."""
+from gibench.baselines.relighting import CHANNELS, DENOISED
 
 WAVELETS = (
     Knob("wavelets", 64, (16, 32, 64, 128, 256), "of the environment, that a frame is made from"),
@@ -31,7 +23,7 @@ METHOD = Method(
     tracks=("relight",),
     paper="Raghavan et al. 2023, Neural Free-Viewpoint Relighting for Glossy Indirect Illumination",
     implementation="gibench.baselines.neural_free_viewpoint_relighting.implementation:NeuralRelighting",
-    channels=("indirect_diffuse", "indirect_specular", *SURFACE),
+    channels=CHANNELS,
     knobs=(
         *WAVELETS,
         *DENOISED,

@@ -1,128 +1,55 @@
-"""The method `nfvr`: path-traced direct light, and indirect light by a network, wavelet by wavelet."""
+"""The method `nfvr`: indirect light by a network, wavelet by wavelet."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from functools import lru_cache, partial
-from typing import Any, cast
+from collections.abc import Mapping
+from typing import ClassVar, cast
 
-import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
-from gibench.baselines.direct_light.tracer import DirectLight
-from gibench.baselines.environments import environment_of
-from gibench.baselines.first_hits import averaged
-from gibench.baselines.image_to_image.device_frames import DeviceFrames
-from gibench.baselines.image_to_image.frames import Frames, Images, held_out
-from gibench.baselines.method import MethodError, Prediction, Setting, Site, Training, View, reading
-from gibench.baselines.neural_free_viewpoint_relighting import METHOD, SURFACE
-from gibench.baselines.neural_free_viewpoint_relighting.examples import Examples
-from gibench.baselines.neural_free_viewpoint_relighting.inputs import Box, hit, surfaces
-from gibench.baselines.neural_free_viewpoint_relighting.training import Relighting, TrainingPlan
-from gibench.baselines.path_traced.tracer import GUIDES
-from gibench.baselines.sources import digest
-from gibench.baselines.stages import Stages
-from gibench.baselines.training import artifacts
-from gibench.baselines.training.checkpoints import Checkpoint
-from gibench.baselines.training_set import TrainingSet
-from gibench.baselines.wavelets.light import WaveletLight, chosen_light, coefficients_of
+from gibench.baselines.method import Method, Setting
+from gibench.baselines.neural_free_viewpoint_relighting import METHOD
+from gibench.baselines.neural_free_viewpoint_relighting.network import TransportNetwork
+from gibench.baselines.neural_free_viewpoint_relighting.training import STEPS, Plan, WaveletTransport
+from gibench.baselines.relighting.examples import Examples, Light
+from gibench.baselines.relighting.implementation import RelitByNetwork
+from gibench.baselines.wavelets.light import chosen_light, coefficients_of
 from gibench.baselines.wavelets.selection import Weighting
 from gibench.rendering.backend import torch_device
-from gibench.rendering.denoise import denoise
-
-HELD_OUT, JUDGED = 0.05, 8
-"""Share of the training frames that is held out, and how many of these are looked at."""
-
-MEASURED = 64
-"""Training frames that say how large the scene is."""
+from gibench.rendering.lighting import EnvironmentMap
 
 
-class NeuralRelighting(DirectLight):
+class NeuralRelighting(RelitByNetwork):
     """See `gibench.baselines.neural_free_viewpoint_relighting.METHOD`."""
+
+    method: ClassVar[Method] = METHOD
+    steps: ClassVar[int] = STEPS
+    network: TransportNetwork
 
     def adjust(self, settings: Mapping[str, Setting]) -> None:
         """Take other settings that do not train."""
         super().adjust(settings)
-        self.settings = dict(settings)
         self._wavelets = int(settings["wavelets"])
         self._selection = cast("Weighting", settings["selection"])
 
-    def train(self, training: Training) -> float:
-        """Learn the scene. Returns seconds that were spent before."""
-        views = training.views
-        learned, judged = held_out(views, HELD_OUT, JUDGED)
-        plan = TrainingPlan.of(self.settings, training.seed, training.seconds)
-        box = box_of(views, learned)
-        examples, apart = (Examples(views, numbers, box, plan.faces) for numbers in (learned, judged))
-        learner = Relighting(examples, apart, plan, torch_device())
-        names = METHOD.trained_settings(self.settings)
-        owner = {"method": "nfvr", "sources": digest(__name__), "views": views.sha256, **names}
-        trained = learner.trained(Checkpoint(training.checkpoint, owner))
-        artifacts.keep(training.folder, trained, **box.facts())
-        return trained.before
+    def untrained(self, seed: int) -> TransportNetwork:
+        """As the settings say."""
+        return Plan.of(self.settings, seed).network()
 
-    @staticmethod
-    def parts_of(site: Site) -> list[str]:
-        """Of what is traced, direct light as a whole."""
-        return ["full"]
+    def learner(self, examples: Examples, apart: Examples, seed: int) -> WaveletTransport:
+        """As the settings say."""
+        return WaveletTransport(examples, apart, Plan.of(self.settings, seed), torch_device())
 
-    def prepare(self, site: Site) -> None:
-        """Read the network."""
-        super().prepare(site)
-        if site.weights is None:
-            raise MethodError("nfvr has not been trained: it needs the folder that `train` filled")
-        plan = TrainingPlan.of(self.settings, site.seed, None)
-        self.network, self._faces = plan.network(), plan.faces
-        with reading("the trained network", site.weights):
-            weights, facts = artifacts.kept(site.weights)
-            self.network.load_state_dict(weights["network"])
-            self.box = Box.of_facts(facts)
-        self.network.eval().requires_grad_(False).to(torch_device())
-        self._surfaces = DeviceFrames(site.scene, SURFACE)
-        self._scored = set(site.parts)
-        self._coefficients = lru_cache(maxsize=1)(partial(coefficients_of, faces=self._faces))
+    def light_of(self, environment: EnvironmentMap) -> Light:
+        """Its Haar coefficients (6, S, S, 3)."""
+        return coefficients_of(environment, int(self.settings["faces"]))
 
-    def render(self, view: View, stages: Stages) -> Prediction:
-        """Direct light, and the dot product of light and transport at every pixel that sees a surface."""
-        environment = environment_of(view, "nfvr")
-        with stages.stage("ray casting"):
-            traced = self._traced(view)
-            direct, *guides = (averaged(traced[name], view.resolution) for name in ("full", *GUIDES))
-        with stages.stage("g-buffer"):
-            images = self._surfaces.read(view.camera, view.resolution)
-        with stages.stage("light"):
-            light = chosen_light(self._coefficients(environment), self._wavelets, self._selection)
-        with stages.stage("inference"), torch.inference_mode():
-            indirect = self.indirect(images, view, light)
-        with stages.stage("denoising"):
-            return self._finished(np.asarray(direct), indirect, [np.asarray(guide) for guide in guides])
+    def told(self, light: Light) -> tuple[Tensor, Tensor]:
+        """Places and weights of the wavelets that matter most."""
+        places, weights = chosen_light(light, self._wavelets, self._selection)
+        return torch.from_numpy(places).to(torch_device()), torch.from_numpy(weights).to(torch_device())
 
-    def indirect(self, images: Images, view: View, light: WaveletLight) -> Tensor:
-        """Indirect radiance (H, W, 3), ≥ 0, on the device; 0 where no surface is seen."""
-        seen = hit(images)
-        pixels = surfaces(images, view.camera, seen)
-        places, weights = (torch.from_numpy(part).to(seen.device) for part in light)
-        found = self.network.frame(self.box.inside(pixels.places), pixels.material, places, weights)
-        image = found.new_zeros(*seen.shape, 3)
-        image[seen] = found.clamp(min=0)
-        return image
-
-    def _finished(self, direct: NDArray[Any], indirect: Tensor, guides: Sequence[NDArray[Any]]) -> Prediction:
-        """Denoise direct light, or all of the light and, where it is scored, indirect light once more."""
-        made = indirect.cpu().numpy()
-        albedo, normal = guides
-        clean = partial(denoise, albedo=albedo, normal=normal)
-        if not self._denoise:
-            return Prediction(clean(direct) + made, indirect=made)
-        return Prediction(clean(direct + made), indirect=clean(made) if "indirect" in self._scored else None)
-
-
-def box_of(views: TrainingSet, numbers: Sequence[int]) -> Box:
-    """The box of the places that some of the frames see."""
-    count = min(MEASURED, len(numbers))
-    some = [numbers[k * len(numbers) // count] for k in range(count)]
-    frames = Frames(views, ("position", "normal"), some)
-    read = (frames[index] for index in range(len(frames)))
-    return Box.around(images["position"][:, hit(images)].T for images in read)
+    def radiance(self, points: Tensor, material: Tensor, told: tuple[Tensor, Tensor]) -> Tensor:
+        """The dot product of light and transport."""
+        return self.network.frame(points, material, *told)

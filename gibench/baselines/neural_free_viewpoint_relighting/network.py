@@ -17,7 +17,8 @@ from typing import NamedTuple
 import torch
 from torch import Tensor, nn
 
-from gibench.baselines.neural_free_viewpoint_relighting.inputs import MATERIAL, coded
+from gibench.baselines.neural_free_viewpoint_relighting.inputs import coded
+from gibench.baselines.relighting.surfaces import MATERIAL
 from gibench.baselines.training.encodings.hash_grid import HashGrid
 
 DEGREE = 3

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import torch
 
-from gibench.baselines.neural_free_viewpoint_relighting.examples import Seen
+from gibench.baselines.relighting.examples import Seen
 from gibench.baselines.wavelets.haar import haar
 from gibench.baselines.wavelets.light import weights_of
 

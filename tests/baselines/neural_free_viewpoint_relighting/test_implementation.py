@@ -11,12 +11,11 @@ import torch
 from gibench.baselines.method import MethodError, View
 from gibench.baselines.neural_free_viewpoint_relighting import METHOD
 from gibench.baselines.neural_free_viewpoint_relighting.implementation import NeuralRelighting
-from gibench.baselines.neural_free_viewpoint_relighting.inputs import Box
-from gibench.baselines.neural_free_viewpoint_relighting.training import TrainingPlan
+from gibench.baselines.neural_free_viewpoint_relighting.training import Plan
+from gibench.baselines.relighting.surfaces import Box
 from gibench.baselines.stages import Stages
 from gibench.baselines.training.artifacts import RECORD, WEIGHTS
 from gibench.baselines.training.files import write_tensors
-from gibench.baselines.wavelets.light import chosen_light, coefficients_of
 from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.lighting import EnvironmentMap, Lighting, Shot
 from gibench.rendering.panoramas import HEIGHT, Panorama
@@ -38,7 +37,7 @@ def weights(tmp_path_factory):
     """Of a network that has learned nothing."""
     folder = tmp_path_factory.mktemp("weights")
     torch.manual_seed(0)
-    network = TrainingPlan.of(METHOD.settings(SMALL), 0, None).network()
+    network = Plan.of(METHOD.settings(SMALL), 0).network()
     facts = Box((-1.5, -1.5, 0.0), (3.0, 3.0, 2.0)).facts()
     write_tensors(folder / WEIGHTS, {"weights": {"network": network.state_dict()}, "facts": facts})
     (folder / RECORD).write_text("{}")
@@ -113,9 +112,9 @@ def test_light_is_linear(rig, method, weights, tmp_path):
 
 
 def test_a_black_environment_gives_black(rig, method):
-    light = chosen_light(np.zeros((6, 16, 16, 3)), 64, "area")
     images = method._surfaces.read(CAMERA, RESOLUTION)
-    found = method.indirect(images, View(Shot(CAMERA), None, RESOLUTION, 0, 0), light)
+    told = method.told(np.zeros((6, 16, 16, 3)))
+    found = method.indirect(images, View(Shot(CAMERA), None, RESOLUTION, 0, 0), told)
     assert found.shape == (32, 40, 3)
     assert not found.any()
 
@@ -126,9 +125,9 @@ def test_pixels_that_see_no_surface_have_no_indirect_light(rig, method):
     assert not found.indirect.any()
     assert found.color.any()
     seen = method._surfaces.read(CAMERA, RESOLUTION)["normal"].abs().sum(dim=0).numpy() > 0
-    light = chosen_light(coefficients_of(environment(noise()), 16), 64, "area")
     images = method._surfaces.read(CAMERA, RESOLUTION)
-    made = method.indirect(images, View(Shot(CAMERA), None, RESOLUTION, 0, 0), light).numpy()
+    told = method.told(method.light_of(environment(noise())))
+    made = method.indirect(images, View(Shot(CAMERA), None, RESOLUTION, 0, 0), told).numpy()
     assert 0.1 < seen.mean() < 1
     assert not made[~seen].any()
 

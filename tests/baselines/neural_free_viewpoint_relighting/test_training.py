@@ -9,8 +9,7 @@ import torch
 
 from gibench.baselines.neural_free_viewpoint_relighting import METHOD
 from gibench.baselines.neural_free_viewpoint_relighting.network import FULL
-from gibench.baselines.neural_free_viewpoint_relighting.training import Relighting, TrainingPlan
-from gibench.baselines.training.batches import batches
+from gibench.baselines.neural_free_viewpoint_relighting.training import Plan, WaveletTransport
 from gibench.baselines.training.budget import Budget
 from gibench.baselines.training.checkpoints import Checkpoint
 from gibench.baselines.training.loop import train
@@ -20,14 +19,12 @@ SMALL = {"network": "small", "faces": 16, "table": 12, "batch": 64, "learned": 1
 
 
 def plan(**settings):
-    return dataclasses.replace(
-        TrainingPlan.of(METHOD.settings({**SMALL, **settings}), seed=3, seconds=1.0), faces=FACES
-    )
+    return dataclasses.replace(Plan.of(METHOD.settings({**SMALL, **settings}), seed=3), faces=FACES)
 
 
 def learnt(steps, checkpoint=None, **settings):
-    learner = Relighting(Made(), Made(2, first=100), plan(**settings))
-    drawn = batches(learner.examples, 4, 3, draw=learner.draw)
+    learner = WaveletTransport(Made(), Made(2, first=100), plan(**settings))
+    drawn = learner.batches()
     return train(learner, drawn, Budget(steps=steps, look_every=steps), seed=3, checkpoint=checkpoint)
 
 
@@ -38,12 +35,12 @@ def test_it_learns_the_transport_of_light_that_it_never_saw():
 
 def test_it_repeats_to_the_bit_also_where_it_was_cut_off(tmp_path):
     whole = learnt(8)
-    learner = Relighting(Made(), Made(2, first=100), plan())
+    learner = WaveletTransport(Made(), Made(2, first=100), plan())
     budget = Budget(steps=8, look_every=8)
 
     def until(last):
         def begin(first):
-            for number, batch in enumerate(batches(learner.examples, 4, 3, draw=learner.draw)(first), first):
+            for number, batch in enumerate(learner.batches()(first), first):
                 if number == last:
                     raise KeyboardInterrupt
                 yield batch
@@ -61,13 +58,13 @@ def test_it_repeats_to_the_bit_also_where_it_was_cut_off(tmp_path):
 @pytest.mark.parametrize("variant", [None, *METHOD.variants], ids=lambda variant: variant and variant.name)
 def test_variants_are_what_they_say(variant):
     made = plan(**(variant.settings if variant else {}))
-    learner = Relighting(Made(1, 20), Made(1, 20), made)
+    learner = WaveletTransport(Made(1, 20), Made(1, 20), made)
     name = variant.name if variant else ""
-    assert (learner.draw.disagreement is None) == (name == "uniform-pixels")
+    assert (learner.drawing.disagreement is None) == (name == "uniform-pixels")
     assert learner.network.first.in_features == 32 + 13 + (0 if name == "no-encoding" else 16)
 
 
 def test_the_defaults_are_those_of_the_paper():
-    made = TrainingPlan.of(METHOD.settings(), seed=0, seconds=None)
+    made = Plan.of(METHOD.settings(), seed=0)
     assert (made.size, made.table, made.faces) == (FULL, 19, 64)
     assert (made.pixels, made.learned, made.important, made.encoding) == (2048, 300, True, True)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import torch
 
-from gibench.baselines.neural_free_viewpoint_relighting.examples import Disagreement, Draw, Seen, spread
+from gibench.baselines.neural_free_viewpoint_relighting.draws import Disagreement, Draw, spread
+from gibench.baselines.relighting.examples import Seen
 from gibench.baselines.wavelets.selection import largest
 from tests.baselines.neural_free_viewpoint_relighting.made import Made
 
@@ -63,15 +64,15 @@ def test_a_brighter_environment_is_no_disagreement():
 def test_half_of_the_wavelets_are_the_largest_and_none_comes_twice():
     seen, coefficients = Made(1)[0]
     example = Draw(16, 40, None)((seen, coefficients), np.random.default_rng(1))
-    places = example.places.numpy()
+    places = example.inputs[2].numpy()
     assert len(np.unique(places)) == 40
     np.testing.assert_array_equal(places[:20], largest(coefficients, 20))
-    assert example.light.shape == (40, 3)
+    assert example.inputs[3].shape == (40, 3)
     assert example.truth.shape == (16, 3)
     again = Draw(16, 40, None)((seen, coefficients), np.random.default_rng(1))
-    assert torch.equal(again.places, example.places)
+    assert torch.equal(again.inputs[2], example.inputs[2])
     few = Draw(16, 1000, None)((seen, coefficients), np.random.default_rng(1))  # of 96
-    assert len(np.unique(few.places.numpy())) == 96
+    assert len(np.unique(few.inputs[2].numpy())) == 96
 
 
 def test_a_frame_that_sees_nothing_is_black():
@@ -79,13 +80,13 @@ def test_a_frame_that_sees_nothing_is_black():
     empty = Seen(*(part[:0] for part in seen))
     example = Draw(16, 8, Disagreement([empty]))((empty, coefficients), np.random.default_rng(0))
     assert not example.truth.any()
-    assert not example.light.any()
-    assert spread((empty, coefficients), 10, 8).points.shape == (0, 3)
+    assert not example.inputs[3].any()
+    assert spread((empty, coefficients), 10, 8).inputs[0].shape == (0, 3)
 
 
 @pytest.mark.parametrize(("pixels", "count"), [(10, 10), (10**6, 200)])
 def test_held_out_pixels_are_spread_evenly(pixels, count):
     example = spread(Made(1)[0], pixels, 16)
-    assert example.points.shape == (count, 3)
-    assert len(torch.unique(example.points, dim=0)) == count
-    assert example.light.shape == (16, 3)
+    assert example.inputs[0].shape == (count, 3)
+    assert len(torch.unique(example.inputs[0], dim=0)) == count
+    assert example.inputs[3].shape == (16, 3)
