@@ -45,7 +45,7 @@ class RelightingLearner(Learner):
         super().__init__({"network": network}, {"network": optimiser})
         # Read once, and before any clock says what a look takes.
         found = [self.judged(apart[index]) for index in range(len(apart))]
-        self.held_out: Sequence[Example] = [one.on(self.device) for one in found if len(one.truth)]
+        self.held_out: Sequence[Example] = [one.on(self.device) for one in found if one.truth.numel()]
 
     @abstractmethod
     def draw(self, example: tuple[Seen, Light], random: np.random.Generator) -> Example:

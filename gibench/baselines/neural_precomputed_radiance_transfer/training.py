@@ -1,0 +1,69 @@
+"""How the networks learn a scene (Rainer et al. 2022): absolute differences of log(1 + x)."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from gibench.baselines.neural_precomputed_radiance_transfer.environment import mean_radiance
+from gibench.baselines.neural_precomputed_radiance_transfer.network import TransferNetwork
+from gibench.baselines.relighting.examples import Example, Examples, Light, Seen, evenly, some_of
+from gibench.baselines.relighting.learner import FRAMES, JUDGED_PIXELS, RelightingLearner
+from gibench.baselines.training.codes import MuLaw
+from gibench.baselines.training.losses.pixels import absolute
+
+STEPS = 500_000
+"""Where no time is set."""
+
+LOGARITHM = MuLaw(mu=1.0)
+"""log(1 + x) / log 2, continued to negative numbers."""
+
+
+class RadianceTransfer(RelightingLearner):
+    """The networks of a scene."""
+
+    rate: ClassVar[float] = 1e-3
+    """The authors have 1e-4, and make many more steps."""
+
+    def __init__(
+        self, network: TransferNetwork, examples: Examples, apart: Examples, pixels: int, seed: int
+    ) -> None:
+        """network: on its device. apart: what is held out. pixels: of a step."""
+        self.pixels = max(1, pixels // FRAMES)
+        super().__init__(network, examples, apart, seed)
+
+    def draw(self, example: tuple[Seen, Light], random: np.random.Generator) -> Example:
+        """Any pixels. A frame that sees no surface gives pixels that are black in truth, without light."""
+        seen, picture = example
+        if not len(seen.points):
+            seen = Seen(*(torch.zeros(1, *part.shape[1:]) for part in seen))
+            picture = np.zeros_like(picture)
+        return example_of(
+            seen, picture, torch.from_numpy(random.integers(len(seen.points), size=self.pixels))
+        )
+
+    def judged(self, example: tuple[Seen, Light]) -> Example:
+        """Pixels all over the frame."""
+        seen, picture = example
+        found = example_of(seen, picture, evenly(seen, JUDGED_PIXELS))
+        return Example(found.truth[None], tuple(part[None] for part in found.inputs))
+
+    def loss(self, made: Tensor, true: Tensor) -> Tensor:
+        """Mean absolute difference of logarithms."""
+        return absolute(LOGARITHM.encode(made), LOGARITHM.encode(true))
+
+
+def example_of(seen: Seen, picture: Light, pixel: Tensor) -> Example:
+    """Some pixels of a frame; inputs are points, material, the picture in units of its mean, and that mean."""
+    truth, points, material = some_of(seen, pixel)
+    unit, mean = in_units(picture)
+    return Example(truth, (points, material, unit, torch.tensor(mean, dtype=torch.float32)))
+
+
+def in_units(picture: Light) -> tuple[Tensor, float]:
+    """A picture (3, H, 2·H) in units of its mean radiance, and that; black stays black."""
+    mean = mean_radiance(picture)
+    return torch.from_numpy((picture / (mean if mean > 0 else 1.0)).astype(np.float32)), mean
