@@ -26,6 +26,9 @@ DEGREE = 3
 pads them to the published size.
 """
 
+CALM = 0.1
+"""Of the first weights of the last layer: the network begins with little light, whatever it is asked about."""
+
 FIELD_PIXELS = 1 << 14
 """Pixels whose features are looked up at once: an index for each corner of each level is the largest of a frame."""
 
@@ -99,6 +102,9 @@ class TransportNetwork(nn.Module):
         self.first = nn.Linear(size.mixed + given, size.hidden)
         self.second = nn.Linear(size.hidden, size.hidden)
         self.last = nn.Linear(size.hidden, 3)
+        with torch.no_grad():
+            for part in (self.last.weight, self.last.bias):
+                part *= CALM
 
     def folded(self, places: Tensor, light: Tensor) -> Folded:
         """places: (…, K) of wavelets. light: (…, K, 3), their weights."""
