@@ -11,7 +11,7 @@ from torch import Tensor
 from gibench.baselines.method import Method, Setting
 from gibench.baselines.neural_free_viewpoint_relighting import METHOD
 from gibench.baselines.neural_free_viewpoint_relighting.network import TransportNetwork
-from gibench.baselines.neural_free_viewpoint_relighting.training import STEPS, Plan, WaveletTransport
+from gibench.baselines.neural_free_viewpoint_relighting.training import STEPS, TrainingPlan, WaveletTransport
 from gibench.baselines.relighting.examples import Examples, Light
 from gibench.baselines.relighting.implementation import RelitByNetwork
 from gibench.baselines.wavelets.light import chosen_light, coefficients_of
@@ -35,11 +35,11 @@ class NeuralRelighting(RelitByNetwork):
 
     def untrained(self, seed: int) -> TransportNetwork:
         """As the settings say."""
-        return Plan.of(self.settings, seed).network()
+        return TrainingPlan.of(self.settings, seed).network()
 
     def learner(self, examples: Examples, apart: Examples, seed: int) -> WaveletTransport:
         """As the settings say."""
-        return WaveletTransport(examples, apart, Plan.of(self.settings, seed), torch_device())
+        return WaveletTransport(examples, apart, TrainingPlan.of(self.settings, seed), torch_device())
 
     def light_of(self, environment: EnvironmentMap) -> Light:
         """Its Haar coefficients (6, S, S, 3)."""

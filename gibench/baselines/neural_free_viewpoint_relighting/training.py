@@ -30,7 +30,7 @@ JUDGED_WAVELETS = 64
 
 
 @dataclass(frozen=True)
-class Plan:
+class TrainingPlan:
     """What decides a training, beside its frames and its end.
 
     size, table, faces, encoding: of the network. pixels, learned: of a step. important: whether pixels are drawn where
@@ -47,9 +47,9 @@ class Plan:
     seed: int
 
     @staticmethod
-    def of(settings: Mapping[str, Setting], seed: int) -> Plan:
+    def of(settings: Mapping[str, Setting], seed: int) -> TrainingPlan:
         """From the settings of the method."""
-        return Plan(
+        return TrainingPlan(
             {"full": FULL, "small": SMALL}[str(settings["network"])],
             int(settings["table"]),
             int(settings["faces"]),
@@ -75,7 +75,7 @@ class WaveletTransport(RelightingLearner):
     epsilon: ClassVar[float] = 1e-15
     """Features begin at 1e-4, and so do gradients (Müller et al. 2022, section 4)."""
 
-    def __init__(self, examples: Examples, apart: Examples, plan: Plan, device: str = "cpu") -> None:
+    def __init__(self, examples: Examples, apart: Examples, plan: TrainingPlan, device: str = "cpu") -> None:
         """apart: what is held out."""
         disagreement = None
         if plan.important:

@@ -9,7 +9,7 @@ import torch
 
 from gibench.baselines.neural_free_viewpoint_relighting import METHOD
 from gibench.baselines.neural_free_viewpoint_relighting.network import FULL
-from gibench.baselines.neural_free_viewpoint_relighting.training import Plan, WaveletTransport
+from gibench.baselines.neural_free_viewpoint_relighting.training import TrainingPlan, WaveletTransport
 from gibench.baselines.training.budget import Budget
 from gibench.baselines.training.checkpoints import Checkpoint
 from gibench.baselines.training.loop import train
@@ -19,7 +19,7 @@ SMALL = {"network": "small", "faces": 16, "table": 12, "batch": 64, "learned": 1
 
 
 def plan(**settings):
-    return dataclasses.replace(Plan.of(METHOD.settings({**SMALL, **settings}), seed=3), faces=FACES)
+    return dataclasses.replace(TrainingPlan.of(METHOD.settings({**SMALL, **settings}), seed=3), faces=FACES)
 
 
 def learnt(steps, checkpoint=None, **settings):
@@ -65,6 +65,6 @@ def test_variants_are_what_they_say(variant):
 
 
 def test_the_defaults_are_those_of_the_paper():
-    made = Plan.of(METHOD.settings(), seed=0)
+    made = TrainingPlan.of(METHOD.settings(), seed=0)
     assert (made.size, made.table, made.faces) == (FULL, 19, 64)
     assert (made.pixels, made.learned, made.important, made.encoding) == (2048, 300, True, True)
