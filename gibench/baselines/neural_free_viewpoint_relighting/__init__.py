@@ -16,6 +16,22 @@ WAVELETS = (
 )
 """Of all methods whose light is in wavelets; none of them needs another training."""
 
+TRAINING = (
+    Knob("network", "full", ("small", "full"), "of 32 or the paper's 64 products", trains=True),
+    Knob("faces", 64, (16, 32, 64), "texels along a face of the cubemap of light", trains=True),
+    Knob("encoding", True, (False, True), "spherical harmonics of the reflected direction", trains=True),
+    Knob(
+        "pixels",
+        "important",
+        ("uniform", "important"),
+        "where training looks: anywhere, or also where it is hard",
+        trains=True,
+    ),
+    Knob("batch", 2048, (64, 256, 512, 1024, 2048), "pixels of a step", trains=True),
+    Knob("learned", 300, (16, 32, 64, 96, 150, 300), "wavelets of a step", trains=True),
+)
+"""Knobs of the training of a network of wavelets."""
+
 METHOD = Method(
     id="nfvr",
     title="Neural free-viewpoint relighting",
@@ -27,8 +43,7 @@ METHOD = Method(
     knobs=(
         *WAVELETS,
         *DENOISED,
-        Knob("network", "full", ("small", "full"), "of 32 or the paper's 64 products", trains=True),
-        Knob("faces", 64, (16, 32, 64), "texels along a face of the cubemap of light", trains=True),
+        *TRAINING,
         Knob(
             "table",
             19,
@@ -36,16 +51,6 @@ METHOD = Method(
             "binary logarithm of the entries of a level of the hash grid",
             trains=True,
         ),
-        Knob("encoding", True, (False, True), "spherical harmonics of the reflected direction", trains=True),
-        Knob(
-            "pixels",
-            "important",
-            ("uniform", "important"),
-            "where training looks: anywhere, or also where it is hard",
-            trains=True,
-        ),
-        Knob("batch", 2048, (64, 256, 512, 1024, 2048), "pixels of a step", trains=True),
-        Knob("learned", 300, (16, 32, 64, 96, 150, 300), "wavelets of a step", trains=True),
     ),
     budget="wavelets",
     trains=True,

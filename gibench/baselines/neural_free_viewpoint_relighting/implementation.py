@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from typing import ClassVar, cast
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from gibench.baselines.method import Method, Setting
 from gibench.baselines.neural_free_viewpoint_relighting import METHOD
-from gibench.baselines.neural_free_viewpoint_relighting.network import TransportNetwork
+from gibench.baselines.neural_free_viewpoint_relighting.network import HashField, Size, TransportNetwork
 from gibench.baselines.neural_free_viewpoint_relighting.training import STEPS, TrainingPlan, WaveletTransport
 from gibench.baselines.relighting.examples import Examples, Light
 from gibench.baselines.relighting.implementation import RelitByNetwork
@@ -33,13 +33,18 @@ class NeuralRelighting(RelitByNetwork):
         self._wavelets = int(settings["wavelets"])
         self._selection = cast("Weighting", settings["selection"])
 
+    def field(self, size: Size) -> nn.Module:
+        """Where features of places come from."""
+        return HashField(size, int(self.settings["table"]))
+
     def untrained(self, seed: int) -> TransportNetwork:
         """As the settings say."""
-        return TrainingPlan.of(self.settings, seed).network()
+        return TrainingPlan.of(self.settings, seed).network(self.field)
 
     def learner(self, examples: Examples, apart: Examples, seed: int) -> WaveletTransport:
         """As the settings say."""
-        return WaveletTransport(examples, apart, TrainingPlan.of(self.settings, seed), torch_device())
+        network = self.untrained(seed).to(torch_device())
+        return WaveletTransport(network, examples, apart, TrainingPlan.of(self.settings, seed))
 
     def light_of(self, environment: EnvironmentMap) -> Light:
         """Its Haar coefficients (6, S, S, 3)."""

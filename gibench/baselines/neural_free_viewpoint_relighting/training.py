@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from torch import Tensor
+from torch import Tensor, nn
 
 from gibench.baselines.method import Setting
 from gibench.baselines.neural_free_viewpoint_relighting.draws import Disagreement, Draw, spread
 from gibench.baselines.neural_free_viewpoint_relighting.network import (
     FULL,
     SMALL,
-    HashField,
     Size,
     TransportNetwork,
 )
@@ -33,12 +32,11 @@ JUDGED_WAVELETS = 64
 class TrainingPlan:
     """What decides a training, beside its frames and its end.
 
-    size, table, faces, encoding: of the network. pixels, learned: of a step. important: whether pixels are drawn where
-    it is hard.
+    size, faces, encoding: of the network. pixels, learned: of a step. important: whether pixels are drawn where it is
+    hard.
     """
 
     size: Size
-    table: int
     faces: int
     encoding: bool
     pixels: int
@@ -51,7 +49,6 @@ class TrainingPlan:
         """From the settings of the method."""
         return TrainingPlan(
             {"full": FULL, "small": SMALL}[str(settings["network"])],
-            int(settings["table"]),
             int(settings["faces"]),
             bool(settings["encoding"]),
             int(settings["batch"]),
@@ -60,11 +57,10 @@ class TrainingPlan:
             seed,
         )
 
-    def network(self) -> TransportNetwork:
-        """Untrained."""
+    def network(self, field: Callable[[Size], nn.Module]) -> TransportNetwork:
+        """Untrained. field: makes that of the network's size."""
         with seeded(self.seed):
-            field = HashField(self.size, self.table)
-            return TransportNetwork(field, self.size, self.faces, encoding=self.encoding)
+            return TransportNetwork(field(self.size), self.size, self.faces, encoding=self.encoding)
 
 
 class WaveletTransport(RelightingLearner):
@@ -75,13 +71,15 @@ class WaveletTransport(RelightingLearner):
     epsilon: ClassVar[float] = 1e-15
     """Features begin at 1e-4, and so do gradients (Müller et al. 2022, section 4)."""
 
-    def __init__(self, examples: Examples, apart: Examples, plan: TrainingPlan, device: str = "cpu") -> None:
-        """apart: what is held out."""
+    def __init__(
+        self, network: TransportNetwork, examples: Examples, apart: Examples, plan: TrainingPlan
+    ) -> None:
+        """network: of the plan, on its device. apart: what is held out."""
         disagreement = None
         if plan.important:
             disagreement = Disagreement(examples.seen(index) for index in range(len(examples)))
         self.drawing = Draw(max(1, plan.pixels // FRAMES), plan.learned, disagreement)
-        super().__init__(plan.network().to(device), examples, apart, plan.seed)
+        super().__init__(network, examples, apart, plan.seed)
 
     def draw(self, example: tuple[Seen, Light], random: np.random.Generator) -> Example:
         """By the four strategies."""

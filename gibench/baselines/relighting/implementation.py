@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from functools import lru_cache, partial
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -29,6 +30,7 @@ from gibench.baselines.training import artifacts
 from gibench.baselines.training.budget import Budget
 from gibench.baselines.training.checkpoints import Checkpoint
 from gibench.baselines.training.loop import train
+from gibench.baselines.training_set import TrainingSet
 from gibench.rendering.backend import torch_device
 from gibench.rendering.denoise import denoise
 from gibench.rendering.lighting import EnvironmentMap
@@ -53,6 +55,15 @@ class RelitByNetwork(DirectLight):
         """Take other settings that do not train."""
         super().adjust(settings)
         self.settings = dict(settings)
+
+    def survey(self, views: TrainingSet, number: int, box: Box, folder: Path) -> None:
+        """Make what the network stands on, beside its training, and leave it in a folder: nothing.
+
+        number: of one of the views. box: of the places that they see.
+        """
+
+    def surveyed(self, folder: Path, box: Box) -> None:
+        """Read that again."""
 
     @abstractmethod
     def untrained(self, seed: int) -> nn.Module:
@@ -79,6 +90,7 @@ class RelitByNetwork(DirectLight):
         views = training.views
         learned, judged = held_out(views, HELD_OUT, JUDGED)
         box = box_of(views, learned)
+        self.survey(views, learned[0], box, training.folder)
         examples, apart = (Examples(views, numbers, box, self.light_of) for numbers in (learned, judged))
         learner = self.learner(examples, apart, training.seed)
         names = self.method.trained_settings(self.settings)
@@ -107,11 +119,12 @@ class RelitByNetwork(DirectLight):
             raise MethodError(
                 f"{self.method.id} has not been trained: it needs the folder that `train` filled"
             )
-        network = self.untrained(site.seed)
         with reading("the trained network", site.weights):
             weights, facts = artifacts.kept(site.weights)
-            network.load_state_dict(weights["network"])
             self.box = Box.of_facts(facts)
+            self.surveyed(site.weights, self.box)
+            network = self.untrained(site.seed)
+            network.load_state_dict(weights["network"])
         self.network = network.eval().requires_grad_(False).to(torch_device())
         self._surfaces = DeviceFrames(site.scene, SURFACE)
         self._scored = set(site.parts)

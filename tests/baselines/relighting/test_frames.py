@@ -6,6 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+import trimesh
 
 from gibench.baselines.method import MethodError, View
 from gibench.baselines.neural_free_viewpoint_relighting import METHOD as NFVR
@@ -14,6 +15,8 @@ from gibench.baselines.relighting.surfaces import Box
 from gibench.baselines.stages import Stages
 from gibench.baselines.training.artifacts import WEIGHTS
 from gibench.baselines.training.files import write_tensors
+from gibench.baselines.vertex_features import METHOD as VERTICES
+from gibench.baselines.vertex_features.implementation import MESH
 from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.lighting import EnvironmentMap, Lighting, Shot
 from gibench.rendering.panoramas import HEIGHT, Panorama
@@ -24,6 +27,7 @@ RESOLUTION = (40, 32)
 
 METHODS = {
     "nfvr": (NFVR, {"network": "small", "faces": 16, "table": 12}),
+    "vertex-features": (VERTICES, {"network": "small", "faces": 16}),
     "nprt": (NPRT, {}),
     "nprt:one-branch": (NPRT, {"separated": False}),
 }
@@ -49,9 +53,12 @@ def running(name, **settings):
 def prepared(name, rig, folder, **settings):
     """The method after a training of no step."""
     made = running(name, **settings)
-    facts = Box((-1.5, -1.5, 0.0), (3.0, 3.0, 2.0)).facts()
+    box = Box((-1.5, -1.5, 0.0), (3.0, 3.0, 2.0))
+    mesh = trimesh.creation.box((3, 3, 2))
+    np.savez(folder / MESH, vertices=mesh.vertices, triangles=mesh.faces)
+    made.surveyed(folder, box)
     weights = {"network": made.untrained(0).state_dict()}
-    write_tensors(folder / WEIGHTS, {"weights": weights, "facts": facts})
+    write_tensors(folder / WEIGHTS, {"weights": weights, "facts": box.facts()})
     parts = ("full", "indirect")
     made.prepare(dataclasses.replace(site(rig.scene, folder), weights=folder, rig=rig, parts=parts))
     return made

@@ -1,0 +1,105 @@
+"""Even meshes of parts that are easy, thin, open, broken and huge."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+
+from gibench.baselines.relighting.surfaces import Box
+from gibench.baselines.vertex_features import remeshing
+from gibench.baselines.vertex_features.remeshing import RemeshingError, even_mesh, meshes_of
+from gibench.generators.glb import Y_UP
+
+ROOM = Box((-5.0, -5.0, -5.0), (10.0, 10.0, 10.0))
+
+
+def area(mesh):
+    a, b, c = np.moveaxis(mesh.vertices[mesh.triangles].astype(np.float64), 1, 0)
+    return np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
+
+
+def edges(mesh):
+    corners = mesh.vertices[mesh.triangles]
+    return np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).ravel()
+
+
+def quad(width=2.0, height=1.0):
+    corners = [[0, 0, 0], [width, 0, 0], [width, height, 0], [0, height, 0]]
+    return trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]], process=False)
+
+
+PARTS = {
+    "box": trimesh.creation.box((1, 2, 0.5)),
+    "open edges": quad(),
+    "thin wall": trimesh.creation.box((2, 1, 0.004)),
+    "sliver": trimesh.creation.box((2, 0.01, 0.01)),
+    "speck": trimesh.creation.icosphere(2, 0.01),
+    "ball": trimesh.creation.icosphere(3, 0.5),
+}
+
+
+@pytest.mark.parametrize("part", PARTS.values(), ids=PARTS)
+def test_the_surface_is_kept_and_edges_are_short(part):
+    mesh = even_mesh([part], ROOM, 0.1)
+    assert area(mesh) == pytest.approx(part.area, rel=0.12)
+    assert edges(mesh).max() < 0.3
+    assert np.quantile(edges(mesh), 0.95) < 0.2
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    np.testing.assert_allclose([low, high], part.bounds, atol=0.06)
+    assert np.unique(mesh.triangles).size == len(mesh.vertices)
+
+
+def test_edges_are_as_long_as_asked_for():
+    for edge in (0.2, 0.1, 0.05):
+        found = edges(even_mesh([quad()], ROOM, edge))
+        assert np.median(found) == pytest.approx(edge, rel=0.3)
+        assert np.quantile(found, 0.95) < 2 * edge
+
+
+def test_parts_do_not_grow_together():
+    upper = quad()
+    upper.apply_translation([0, 0, 0.01])
+    mesh = even_mesh([quad(), upper], ROOM, 0.1)
+    for triangle in mesh.vertices[mesh.triangles]:
+        assert np.ptp(triangle[:, 2]) < 1e-4
+
+
+def test_what_is_broken_or_out_of_sight_is_left_out():
+    line = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]], process=False)
+    nothing = trimesh.Trimesh([[np.nan, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], process=False)
+    far = quad()
+    far.apply_translation([100, 0, 0])
+    mesh = even_mesh([line, nothing, far, quad()], ROOM, 0.2)
+    assert area(mesh) == pytest.approx(2, rel=0.05)
+    with pytest.raises(RemeshingError, match="nothing of the scene's meshes"):
+        even_mesh([line, nothing, far], ROOM, 0.2)
+
+
+def test_a_ground_to_the_horizon_is_cut_off():
+    ground = quad(20_000, 20_000)
+    ground.apply_translation([-10_000, -10_000, 0])
+    mesh = even_mesh([ground], ROOM, 0.5)
+    assert area(mesh) == pytest.approx(100, rel=0.05)
+
+
+def test_memory_is_bounded(monkeypatch):
+    monkeypatch.setattr(remeshing, "MOST_VERTICES", 500)
+    monkeypatch.setattr(remeshing, "MOST_TRIANGLES", 2000)
+    fine = trimesh.creation.icosphere(5, 0.5)  # 20,480 triangles
+    mesh = even_mesh([fine, quad()], ROOM, 0.001)
+    assert len(mesh.vertices) < 1500
+    assert area(mesh) == pytest.approx(fine.area + 2, rel=0.12)
+
+
+def test_a_glb_comes_back_with_z_up(tmp_path):
+    scene = trimesh.Scene()
+    part = trimesh.creation.box((1, 2, 3))
+    part.apply_translation([0, 5, 1.5])
+    turn = trimesh.transformations.quaternion_matrix([Y_UP[3], *Y_UP[:3]])
+    scene.add_geometry(part, transform=turn)
+    scene.export(tmp_path / "room.glb")
+    (found,) = meshes_of(tmp_path)
+    np.testing.assert_allclose(found.bounds, part.bounds, atol=1e-6)
+    with pytest.raises(RemeshingError, match="cannot be read"):
+        meshes_of(tmp_path / "nowhere")
