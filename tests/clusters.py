@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -36,16 +37,61 @@ def worker(file: Path, name: str, threads: int | None = None) -> subprocess.Pope
     return dask("worker", *words, "--nthreads", str(threads or os.cpu_count() or 1))
 
 
+#: What stands for programs that a cluster has. What the job at last runs goes on until the job ends.
+PROGRAMS = {
+    "dask": """
+        [ "$1" = scheduler ] && set -- "$@" --host 127.0.0.1
+        exec {python} -m dask "$@" --no-dashboard
+    """,
+    "srun": """
+        while [[ "$1" == -* ]]; do shift; done
+        "$@" & "$@" & wait
+    """,
+    "pbsdsh": """
+        [ "$1" = -- ] && shift
+        "$@" & "$@" & wait
+    """,
+    "make-dataset": """
+        printf '%s\n' "$@" > asked
+        exec sleep 100000
+    """,
+}
+
+
+def batch_job(system: str, folder: Path) -> subprocess.Popen[bytes]:
+    """The batch job of the documentation as a batch system starts it, with two workers and this machine's threads.
+
+    The words of its last command come to lie in `folder/asked`.
+    """
+    page = (Path(__file__).parents[1] / "docs" / "cluster.md").read_text(encoding="utf-8")
+    section = page.partition(f"## {system}\n")[2]
+    job = re.search(r"^```bash\n(.*?)^```$", section, re.M | re.S)[1]
+    (folder / "job").write_text(re.sub(r"\b16\b", str(os.cpu_count() or 1), job), encoding="utf-8")
+    programs = folder / "programs"
+    programs.mkdir()
+    for name, lines in PROGRAMS.items():
+        (programs / name).write_text("#!/bin/bash\n" + lines.replace("{python}", sys.executable))
+        (programs / name).chmod(0o755)
+    given = {
+        **dict.fromkeys(("SLURM_SUBMIT_DIR", "PBS_O_WORKDIR"), str(folder)),
+        **dict.fromkeys(("SLURM_JOB_ID", "PBS_JOBID"), "17"),
+        "PATH": f"{programs}{os.pathsep}{os.environ['PATH']}",
+    }
+    return subprocess.Popen(
+        ["bash", folder / "job"], env=ENVIRONMENT | given, start_new_session=True,
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+
+
 @contextmanager
 def two_workers(folder: Path) -> Iterator[Path]:
-    """A scheduler's file, and two workers that were started by hand, as the jobs of a batch system are."""
-    file = folder / "scheduler.json"
-    processes = [scheduler(file)]
+    """A scheduler's file, and two workers, started as the documentation's job for Slurm starts them."""
+    job = batch_job("Slurm", folder)
     try:
-        processes += [worker(file, name) for name in ("one", "two")]
-        yield file
+        wait_until((folder / "asked").exists)
+        yield folder / "scheduler-17.json"
     finally:
-        killed(*processes)
+        killed(job)
 
 
 def wait_until(condition, seconds: float = 120) -> None:

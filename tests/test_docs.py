@@ -25,6 +25,7 @@ from gibench.generators.materials import MATERIALS, SLOTS, MaterialFamily, SlotR
 from gibench.generators.rooms import sample_room
 from gibench.stress.registry import all_cases
 from gibench.stress.running import Report
+from tests.clusters import batch_job, killed, wait_until
 from tests.generators import test_furniture as furniture_tests
 from tests.generators.materials import test_families as material_tests
 from tests.test_house import MAY_IMPORT
@@ -132,6 +133,29 @@ def test_commands_of_the_page_on_clusters_are_understood(tmp_path, monkeypatch):
             run(app, words[1:])
             assert asked[-1] == (words[words.index("--out") + 1], words[words.index("--cluster") + 1])
     assert asked
+
+
+@pytest.mark.skipif(not hasattr(os, "killpg"), reason="needs process groups")
+@pytest.mark.parametrize("system", ["Slurm", "PBS"])
+def test_batch_jobs_of_the_page_on_clusters_run_as_they_stand(system, tmp_path, monkeypatch):
+    """Up to the last command, by what that asks for. Tests of clusters work on such a job's workers."""
+    distributed = pytest.importorskip("distributed")
+
+    asked = []
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("gibench.cli.making.make_and_print", lambda *given: asked.append(given))
+    job = batch_job(system, tmp_path)
+    try:
+        wait_until((tmp_path / "asked").exists)
+        assert run(make_app, (tmp_path / "asked").read_text().splitlines()) == 0
+        root, recipe, *_, file = asked[0]
+        assert (root, recipe.rooms) == (Path("rooms"), 1500)
+        with distributed.Client(scheduler_file=file, set_as_default=False) as client:
+            client.wait_for_workers(2, timeout=60)
+            threads = {worker["nthreads"] for worker in client.scheduler_info()["workers"].values()}
+            assert threads == {os.cpu_count() or 1}
+    finally:
+        killed(job)
 
 
 @pytest.mark.parametrize(

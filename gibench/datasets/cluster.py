@@ -1,8 +1,8 @@
 """Tasks on a Dask cluster: a room, a training, a result, which one worker at a time does as a local process would.
 
 Workers write into the same folder by the same write-and-rename, so a run on a cluster, a local one and one that was
-resumed make the same files, and any of them continues another. Dask schedules: it gives the tasks of a worker that
-dies to another, and gives a task up that takes three workers with it.
+resumed make the same files, and any of them continues another. Each worker has one task in hand; Dask carries it there
+and tells when the worker is gone, and then it goes to another, unless it has taken three with it.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any
 
 from gibench.datasets import cluster_opening as opening
 from gibench.datasets import cluster_workers as workers
-from gibench.datasets.cluster_opening import DEATHS
 from gibench.datasets.cluster_workers import BEGUN, DONE, RENDERER
 from gibench.datasets.errors import ClusterError, MakingError
 from gibench.datasets.files import process_number
@@ -27,6 +26,9 @@ from gibench.datasets.pool import Listener, Work, explained
 
 if TYPE_CHECKING:
     from distributed import Client, Future
+
+#: Workers that a task may take with it: the third time it is set aside.
+DEATHS = 3
 
 #: Seconds between two looks at how many workers there are.
 LOOK_SECONDS = 0.5
@@ -107,9 +109,9 @@ class _Tasks:
         self.facts: dict[str, Any] = {}
         self.readying: dict[str, Future] = {}
         self.waiting: dict[int, Future] = {}
-        self.places: dict[int, set[str]] = {}
+        self.places: dict[int, str] = {}
+        self.missed: set[str] = set()
         self.last_seen = time.monotonic()
-        self.all_are_able = True
         self.scheduler: str | None = None
 
     def prepare(self) -> None:
@@ -178,11 +180,13 @@ class _Tasks:
                         return [*waiting, *left]
                     looked = time.monotonic()
                 # One a worker: a task that waits behind one that kills the worker would be suspected with it.
-                while left and len(waiting) < len(able):
-                    self._hand_out(left.popleft(), able)
+                busy = set(self.places.values())
+                free = [address for address in able if address not in busy]
+                for address in free[: len(left)]:
+                    self._hand_out(left.popleft(), address)
                 for number in self._listen():
                     if number in waiting:
-                        waiting.pop(number).release()
+                        self._taken_back(number).release()
                     elif number in left:  # done for the client that the scheduler lost before
                         left.remove(number)
                 if self.client.status != "running":
@@ -191,7 +195,7 @@ class _Tasks:
                     if waiting[number].status in ("cancelled", "lost"):
                         return [*waiting, *left]
                     if waiting[number].status == "error" and self._is_to_be_tried(
-                        number, waiting.pop(number)
+                        number, self._taken_back(number)
                     ):
                         left.append(number)
             return []
@@ -210,19 +214,23 @@ class _Tasks:
                 f"no worker has been there for {opening.ABANDONED:.0f} s: start some, then run the same command again "
                 "to continue"
             )
+        # Looked at twice: what a worker said last may be on its way when it is seen to be gone.
+        gone = set(self.places.values()).difference(there)
+        for number in [number for number, address in self.places.items() if address in gone & self.missed]:
+            self.client.cancel([self._taken_back(number)], force=True)
+            if self._has_lives(number):
+                left.appendleft(number)
+        self.missed = gone
         if self.accepts is None:
             return there
         self._ready(address for address in there if address not in {*self.facts, *self.readying})
         self._take(there)
-        for number, places in list(self.places.items()):
-            # Those that it may run on are gone, and it would wait for them.
-            if number in self.waiting and not places.intersection(there):
-                self.client.cancel([self.waiting.pop(number)], force=True)
-                if self._has_lives(number):
-                    left.appendleft(number)
-        able = [address for address in there if address in self.facts and self.accepts(self.facts[address])]
-        self.all_are_able = len(able) == len(there)
-        return able
+        return [address for address in there if address in self.facts and self.accepts(self.facts[address])]
+
+    def _taken_back(self, number: int) -> Future:
+        """A task that is in nobody's hand any more."""
+        del self.places[number]
+        return self.waiting.pop(number)
 
     def _workers(self) -> list[str]:
         """Addresses of the workers. Raises OSError or TimeoutError where the scheduler is gone."""
@@ -238,10 +246,9 @@ class _Tasks:
         self.scheduler = scheduler
         return list(self.client.sync(self.client.scheduler.ncores, callback_timeout=limit))
 
-    def _hand_out(self, number: int, able: list[str]) -> None:
+    def _hand_out(self, number: int, address: str) -> None:
         job, name = self.work.job, self.work.place(number)
-        if not self.all_are_able:
-            self.places[number] = set(able)
+        self.places[number] = address
         self.waiting[number] = self.client.submit(
             workers.do_task,
             Work(self.work.setup, job.of(number) if hasattr(job, "of") else job),
@@ -249,8 +256,9 @@ class _Tasks:
             name,
             str(self.token),
             next(iter(self.facts.values())) if self.accepts is None else None,
-            key=f"{name.replace(' ', '-')}-{self.token.name[9:17]}{secrets.token_hex(2)}",
-            workers=None if self.all_are_able else able,
+            # The dashboard shows what comes before the first word that has a dash in front and a digit in it.
+            key=f"{name.replace('-', ' ')}-{self.token.name[9:17]}{secrets.token_hex(2)}",
+            workers=[address],
             resources={RENDERER: 1},
             priority=-number,
         )
@@ -273,7 +281,6 @@ class _Tasks:
                 self.tries[number] = attempt
                 if kind == DONE:
                     self.tries[number] = DONE
-                    self.places.pop(number, None)
                     self.listener.done(number, content)
                     done.append(number)
                 elif kind == BEGUN:
@@ -283,7 +290,7 @@ class _Tasks:
         return done
 
     def _is_to_be_tried(self, number: int, future: Future) -> bool:
-        """Whether a task that Dask gave up was only near others that killed its workers."""
+        """Whether a task that has failed is tried again. Raises MakingError where nothing but itself is to blame."""
         from distributed import KilledWorker
 
         problem = future.exception()
@@ -301,10 +308,10 @@ class _Tasks:
 
     def _has_lives(self, number: int) -> bool:
         """Whether a task whose worker died is tried again; otherwise it is set aside."""
-        self.places.pop(number, None)
         self.listener.died(number)
         if self.begun[number] < DEATHS:
             return True
+        self.tries[number] = DONE
         why = f"{self.begun[number]} workers that made it died; make it alone to see why"
         self.listener.done(number, {"rejected": why})
         return False

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import logging
 import os
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from gibench import gate
 from gibench.datasets.cluster_workers import DECIDING
 from gibench.datasets.errors import ClusterError
 from gibench.datasets.pool import MOST_WORKERS
@@ -19,11 +22,11 @@ if TYPE_CHECKING:
 #: Seconds that a scheduler and its first worker may take to answer, and a scheduler that was lost to come back.
 PATIENCE = 60.0
 
+#: Seconds that a scheduler may take to write its file.
+WRITING = 2.0
+
 #: Seconds without any worker after which a run ends: those that were there have given up, or their jobs have ended.
 ABANDONED = 600.0
-
-#: Workers that a task may take with it: the third time it is set aside.
-DEATHS = 3
 
 #: Seconds without a sign of life after which a worker of a local cluster is given up.
 SILENCE = 60.0
@@ -43,7 +46,6 @@ def opened(cluster: str, tasks: int = MOST_WORKERS) -> Iterator[str]:
                 f"--cluster: '{cluster}' is not allowed; write local:N with N from 1 to {MOST_WORKERS}"
             )
         settings = {
-            "distributed.scheduler.allowed-failures": DEATHS - 1,
             "distributed.scheduler.worker-ttl": f"{SILENCE:.0f} s",
             "distributed.comm.timeouts.connect": f"{PATIENCE:.0f} s",
         }
@@ -54,6 +56,7 @@ def opened(cluster: str, tasks: int = MOST_WORKERS) -> Iterator[str]:
                 threads_per_worker=max(1, (os.cpu_count() or 1) // int(number)),
                 processes=True,
                 dashboard_address=":0",
+                scheduler_kwargs={"dashboard": False},  # nobody is told its address
                 silence_logs=logging.CRITICAL,
             ) as there,
         ):
@@ -68,14 +71,23 @@ def opened(cluster: str, tasks: int = MOST_WORKERS) -> Iterator[str]:
 def connected(cluster: str, *, lost: bool = False) -> Iterator[Client]:
     """A client of the scheduler at an address, or of a scheduler's file. lost: whether it was there before."""
     _, distributed = _libraries()
-    place = {"scheduler_file": cluster} if cluster.endswith(".json") else {"address": cluster}
+    gone = ClusterError(
+        f"the scheduler at {cluster} is gone: start it again, then run the same command again to continue"
+    )
+    address = cluster
+    if cluster.endswith(".json"):
+        # Dask's client would wait for ever for a file that is not there: a scheduler that ends takes its own away.
+        try:
+            address = _address_in(Path(cluster), PATIENCE if lost else WRITING)
+        except ClusterError:
+            if lost:
+                raise gone from None
+            raise
     try:
-        client = distributed.Client(**place, timeout=PATIENCE, set_as_default=False)
+        client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as problem:
         if lost:
-            raise ClusterError(
-                f"the scheduler at {cluster} is gone: start it again, then run the same command again to continue"
-            ) from None
+            raise gone from None
         raise ClusterError(
             f"--cluster: nobody answers at {cluster} ({' '.join(str(problem).split())[:200]}): start a scheduler "
             "with `dask scheduler`, or write local:N"
@@ -84,6 +96,19 @@ def connected(cluster: str, *, lost: bool = False) -> Iterator[Client]:
         yield client
     finally:
         client.close(timeout=2)
+
+
+def _address_in(file: Path, patience: float) -> str:
+    """Of the scheduler that has written a file. Raises ClusterError where none has after `patience` seconds."""
+    end = time.monotonic() + patience
+    while True:
+        try:
+            return str(json.loads(gate.read_regular(file))["address"])
+        except (gate.GateError, ValueError, LookupError, TypeError):
+            if time.monotonic() > end:
+                break
+        time.sleep(0.1)
+    raise ClusterError(f"--cluster: {file} is not what `dask scheduler --scheduler-file` writes")
 
 
 def _libraries() -> tuple[Any, Any]:

@@ -8,6 +8,7 @@ import importlib.metadata
 import multiprocessing
 import platform
 import secrets
+import threading
 import time
 from pathlib import Path
 from typing import Any
@@ -33,6 +34,9 @@ DECIDING = (
 
 #: What workers say beside what a job reports.
 BEGUN, DONE = "begun", "done"
+
+#: Most seconds that a task waits until the word has left that it has begun.
+SENDING_SECONDS = 5.0
 
 #: What this process of a worker was made ready with, and what came of it.
 _ready: dict[str, Any] = {}
@@ -112,9 +116,12 @@ def do_task(work: Work, number: int, name: str, token: str, facts: dict[str, Any
     from distributed import get_worker
 
     worker, attempt, wanted = get_worker(), secrets.token_hex(4), Path(token)
+    key = worker.get_current_task()
 
     def report(kind: str, content: Any) -> None:
-        if not wanted.exists():
+        # A run that ends takes its token away; of one that is killed the scheduler knows, and gives its tasks up.
+        task = worker.state.tasks.get(key)
+        if not wanted.exists() or task is None or task.state != "executing":
             raise Unwanted(f"{name}: the run that asked for it is gone")
         if kind:
             worker.log_event(wanted.name, (number, attempt, kind, content))
@@ -130,9 +137,9 @@ def do_task(work: Work, number: int, name: str, token: str, facts: dict[str, Any
             f"worker {worker.address} would make other pixels ({', '.join(differing)} differ): take it out of the "
             "cluster, then run the same command again to continue"
         )
-    sent = worker.batched_stream.message_count
+    said = worker.batched_stream.message_count
     report(BEGUN, None)
-    _sent(worker.batched_stream, sent + 1)
+    _wait_until_sent(worker, said + 1)
     try:
         report(DONE, work.job(number, report))
     except Elsewhere:
@@ -143,12 +150,20 @@ def do_task(work: Work, number: int, name: str, token: str, facts: dict[str, Any
         ) from None
 
 
-def _sent(stream: Any, messages: int) -> None:
+def _wait_until_sent(worker: Any, messages: int) -> None:
     """Wait until so many messages have left this process: one that dies at once would take the word with it."""
-    end = time.monotonic() + 5
-    while (stream.message_count < messages or stream.buffer) and time.monotonic() < end:
-        time.sleep(0.005)
-    time.sleep(0.02)
+    stream, sent = worker.batched_stream, threading.Event()
+    end = time.monotonic() + SENDING_SECONDS
+
+    def look() -> None:
+        # What is in the buffer no more was handed to the system before this loop came here.
+        if (stream.message_count >= messages and not stream.buffer) or time.monotonic() > end:
+            sent.set()
+        else:
+            worker.loop.call_later(0.001, look)
+
+    worker.loop.add_callback(look)
+    sent.wait(SENDING_SECONDS)
 
 
 def still_wanted(report: Report) -> bool:

@@ -7,6 +7,7 @@ import os
 import signal
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 
@@ -120,6 +121,16 @@ class Wrong:
         return Prediction(colour)
 
 
+def strike(mark: Path, number: int, *, again: bool) -> None:
+    """Send a signal to the process that watches this one and wait for the end; again: not the first time alone."""
+    if again or not mark.exists():
+        mark.parent.mkdir(parents=True, exist_ok=True)
+        with mark.open("a") as tries:
+            tries.write("x")
+        os.kill(os.getppid(), number)
+        time.sleep(600)
+
+
 class Deadly:
     """Kills the process that watches it, the first time or every time."""
 
@@ -127,13 +138,7 @@ class Deadly:
         self.how = settings["how"]
 
     def prepare(self, site):
-        mark = site.bakes.root.parent / "killed"
-        if self.how == "always" or not mark.exists():
-            mark.parent.mkdir(parents=True, exist_ok=True)
-            with mark.open("a") as tries:
-                tries.write("x")
-            os.kill(os.getppid(), signal.SIGKILL)
-            time.sleep(600)
+        strike(site.bakes.root.parent / "killed", signal.SIGKILL, again=self.how == "always")
 
     def render(self, view, stages):
         return Prediction(image(view, 0.5))
@@ -149,7 +154,7 @@ PLAIN = found("Plain", knobs=(SHADE,))
 
 
 class Learner:
-    """Trains: keeps the mean of what it is given, or fails."""
+    """Trains: keeps the mean of what it is given, or fails, or stops or kills the process that watches it."""
 
     def __init__(self, settings):
         self.settings = dict(settings)
@@ -157,6 +162,10 @@ class Learner:
     def train(self, training):
         if self.settings["how"] == "failing":
             raise ValueError("nothing to learn")
+        if self.settings["how"] == "deadly":
+            strike(training.folder.parents[1] / "killed", signal.SIGKILL, again=True)
+        if self.settings["how"] == "stopping":
+            strike(training.folder.parents[1] / "stopped", signal.SIGSTOP, again=False)
         mean = np.mean([frame["color"].mean() for frame in training.views])
         (training.folder / "mean.txt").write_text(f"{mean} {training.views.rooms} {training.seconds}")
 
@@ -170,7 +179,7 @@ class Learner:
 
 LEARNER = found(
     "Learner",
-    knobs=(Knob("how", "well", ("well", "failing"), "what goes wrong", trains=True),),
+    knobs=(Knob("how", "well", ("well", "failing", "deadly", "stopping"), "what goes wrong", trains=True),),
     channels=("color",),
     trains=True,
 )

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 import signal
+import subprocess
 import sys
 import threading
 import time
@@ -21,7 +23,8 @@ from gibench.datasets.errors import ClusterError, FolderError, Interrupted, Maki
 from gibench.datasets.making import make
 from gibench.datasets.pool import Report
 from gibench.datasets.room_making import RoomMaker
-from tests.clusters import dask, killed, scheduler
+from tests.clusters import ENVIRONMENT, dask, killed, scheduler, wait_until
+from tests.datasets.disks import small_disk
 from tests.datasets.fakes import Broken, Killed, Setup, fake_work, tiny
 
 pytest.importorskip("distributed")
@@ -43,6 +46,15 @@ def left_behind(root: Path) -> list[str]:
     return [p.name for p in [*root.iterdir(), *(root / "rooms").iterdir()] if p.name.startswith(".")]
 
 
+def names_on_the_dashboard(file: Path) -> set[str]:
+    """Of the tasks in hand, shortened as Dask's plots do."""
+    from dask.utils import key_split
+    from distributed import Client
+
+    with Client(scheduler_file=str(file), set_as_default=False) as client:
+        return {key_split(key) for keys in client.processing().values() for key in keys}
+
+
 def test_a_cluster_of_this_machine_and_a_local_run_make_the_same_and_go_on_for_each_other(tmp_path):
     expected = made_locally(tmp_path / "local", 5)
     root = tmp_path / "both"
@@ -57,13 +69,18 @@ def test_a_cluster_of_this_machine_and_a_local_run_make_the_same_and_go_on_for_e
 def test_workers_started_by_hand_that_die_hang_and_refuse(workplace, tmp_path):
     """One after another on the same cluster: what happens to one run leaves the workers to the next."""
     root = tmp_path / "plain"
-    seen = []
-    make(
-        root, tiny(6), cluster=str(workplace), work=fake_work(root, tiny(6)),
-        on_progress=lambda p: seen.append((p.rooms_done, p.frames_done)),
-    )  # fmt: skip
+    seen, shown = [], set()
+
+    def look(progress) -> None:
+        seen.append((progress.rooms_done, progress.frames_done))
+        if not shown:
+            shown.update(names_on_the_dashboard(workplace))
+
+    make(root, tiny(6), cluster=str(workplace), work=fake_work(root, tiny(6), slow=0.1), on_progress=look)
     assert frames_of(root) == made_locally(tmp_path / "local", 6)
     assert seen[-1] == (6, 12)
+    assert shown
+    assert shown <= {f"room {number}" for number in range(6)}
     assert left_behind(root) == []
 
     # A room whose worker is killed goes to another worker.
@@ -82,6 +99,17 @@ def test_workers_started_by_hand_that_die_hang_and_refuse(workplace, tmp_path):
     make(root, tiny(4), cluster=str(workplace), work=fake_work(root, tiny(4)))
     assert len(frames_of(root)) == 8
     assert left_behind(root) == []
+
+
+def test_a_disk_that_is_full_in_truth(workplace, tmp_path):
+    """Here and for the workers; elsewhere the failure above stands for it."""
+    with small_disk(tmp_path / "disk", kilobytes=400) as disk:
+        root, recipe = disk / "d", tiny(30, resolution=(32, 24))
+        with pytest.raises(MakingError, match="the disk is full: free some space"):
+            make(root, recipe, cluster=str(workplace), work=fake_work(root, recipe))
+        assert 0 < len(folder.whole_rooms(root)) < 30
+        assert left_behind(root) == []
+        assert open_dataset(root).manifest["complete"] is False
 
 
 def test_a_room_that_takes_three_workers_with_it_is_set_aside_by_name(tmp_path):
@@ -190,6 +218,35 @@ def test_ctrl_c_stops_rooms_that_are_being_made_and_keeps_those_that_are_whole(w
     assert left_behind(root) == []
 
 
+RUN = """
+import sys
+from pathlib import Path
+from gibench.datasets.making import make
+from tests.datasets.disks import small_disk
+from tests.datasets.fakes import fake_work, tiny
+if __name__ == "__main__":
+    root, recipe = Path(sys.argv[1]), tiny(2, views=100)
+    make(root, recipe, cluster=sys.argv[2], work=fake_work(root, recipe, slow=0.2))
+"""
+
+
+def test_a_run_that_is_killed_takes_its_rooms_with_it_and_another_goes_on(workplace, tmp_path):
+    root = tmp_path / "d"
+    process = subprocess.Popen(
+        [sys.executable, "-c", RUN, root, workplace], env=ENVIRONMENT, start_new_session=True
+    )
+    try:
+        wait_until(lambda: len(list(root.glob("rooms/.0*/frames/*.exr"))) >= 4)
+    finally:
+        killed(process)
+    wait_until(lambda: not list(root.glob("rooms/.0*")))  # they would take 20 s
+    assert folder.whole_rooms(root) == []
+    summary = make(root, tiny(2, views=100), cluster=str(workplace), work=fake_work(root, tiny(2, views=100)))
+    assert (summary.made, summary.frames) == (2, 200)
+    assert [run["ended"] for run in summary.manifest["runs"]] == [False, True]
+    assert left_behind(root) == []
+
+
 def test_two_runs_on_one_folder(workplace, tmp_path):
     root, refused = tmp_path / "d", []
 
@@ -222,6 +279,8 @@ def test_clusters_that_cannot_be_used(workplace, tmp_path, monkeypatch, capsys):
     for wrong in ("local:0", "local:", "local:x", "local:٣", f"local:{10**20}"):
         assert "write local:N with N from 1 to" in refused(["--cluster", wrong])
     assert "there is no scheduler file" in refused(["--cluster", str(tmp_path / "none.json")])
+    (other := tmp_path / "other.json").write_text('{"rooms": 3}')
+    assert "is not what `dask scheduler --scheduler-file` writes" in refused(["--cluster", str(other)])
     monkeypatch.setattr(cluster_opening, "PATIENCE", 1.0)
     assert "nobody answers at tcp://127.0.0.1:9" in refused(["--cluster", "tcp://127.0.0.1:9"])
     lonely = scheduler(tmp_path / "lonely.json")
@@ -231,6 +290,11 @@ def test_clusters_that_cannot_be_used(workplace, tmp_path, monkeypatch, capsys):
         killed(lonely)
     monkeypatch.setattr(cluster_opening, "PATIENCE", 60.0)
 
+    # A folder of the same path that is another one on the workers.
+    unseen = contextlib.nullcontext(tmp_path / "d" / ".cluster-0")
+    with monkeypatch.context() as changed:
+        changed.setattr(cluster, "_token", lambda root: unseen)
+        assert f"does not see the folder {tmp_path / 'd'}: " in refused(["--cluster", str(workplace)])
     here = cluster_workers.versions()
     monkeypatch.setattr(cluster_workers, "versions", lambda: {**here, "mitsuba": "1.2.3"})
     said = refused(["--cluster", str(workplace)])

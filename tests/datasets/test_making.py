@@ -23,6 +23,7 @@ from gibench.datasets.making import Progress, make
 from gibench.datasets.manifest import COLUMNS, read_manifest
 from gibench.datasets.room_making import RoomMaker
 from gibench.datasets.verifying import verify
+from tests.datasets.disks import small_disk
 from tests.datasets.fakes import FACTS, Asleep, Broken, Killed, Pids, Setup, fake_work, tiny
 
 
@@ -399,15 +400,8 @@ def test_a_kill_at_any_instant_is_survived(undisturbed, tmp_path, delay):
 
 
 def test_a_full_disk_leaves_what_is_whole_valid(tmp_path):
-    """On a file system of 300 kB, where it can be mounted; elsewhere the injected error above stands for it."""
-    disk = tmp_path / "disk"
-    disk.mkdir()
-    mounted = subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", "size=400k", "tmpfs", disk], capture_output=True, check=False
-    )
-    if mounted.returncode:
-        pytest.skip("no file system can be mounted here")
-    try:
+    """On a file system of 400 kB, where it can be mounted; elsewhere the injected error above stands for it."""
+    with small_disk(tmp_path / "disk", kilobytes=400) as disk:
         root = disk / "d"
         with pytest.raises(MakingError, match="the disk is full: free some space"):
             make_fake(root, tiny(30, resolution=(32, 24)))
@@ -417,8 +411,6 @@ def test_a_full_disk_leaves_what_is_whole_valid(tmp_path):
         missing = {f"rooms/{room:06d}" for room in set(range(30)) - set(whole)}
         assert missing <= problems <= missing | {"dataset.json", "preview.png", "frames.parquet"}
         assert json.loads((root / "dataset.json").read_text())["complete"] is False
-    finally:
-        subprocess.run(["umount", disk], check=True)
 
 
 def test_the_process_that_hands_out_rooms_loads_no_renderer(tmp_path):
