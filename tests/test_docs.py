@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gibench import metrics
 from gibench.cli import run
 from gibench.cli.app import app, make_app
 from gibench.datasets import load_preset, load_recipe, open_dataset
@@ -23,6 +24,7 @@ from gibench.generators.furniture import FAMILIES, Family
 from gibench.generators.layouts import dressing
 from gibench.generators.materials import MATERIALS, SLOTS, MaterialFamily, SlotRule
 from gibench.generators.rooms import sample_room
+from gibench.metrics import registry
 from gibench.stress.registry import all_cases
 from gibench.stress.running import Report
 from tests.clusters import batch_job, killed, wait_until
@@ -233,9 +235,9 @@ def test_python_runs(home, where, block, monkeypatch):
     exec(compile(block, where, "exec"), {"ref": reference, "pred": reference * np.float32(1.1)})
 
 
-def added(home: Path, path: str, monkeypatch: pytest.MonkeyPatch):
-    """The module that `docs/rooms.md` tells contributors to write, under the name that it would have."""
-    (text,) = [block for block in blocks("docs/rooms.md", "python") if block.startswith(f"# {path}\n")]
+def added(home: Path, path: str, monkeypatch: pytest.MonkeyPatch, where: str = "docs/rooms.md"):
+    """The module that a page tells contributors to write, under the name that it would have."""
+    (text,) = [block for block in blocks(where, "python") if block.startswith(f"# {path}\n")]
     name = path.removesuffix(".py").replace("/", ".")
     file = home / Path(path).name
     file.write_text(text, "utf-8")
@@ -273,6 +275,16 @@ def test_a_new_piece_of_furniture_and_a_new_material_reach_a_room(home, monkeypa
     rooms = [sample_room(0, index, kind="office", environment="none", views=1) for index in range(3)]
     assert "candle" in {thing.family for room in rooms for thing in room.objects}
     assert all("cork" in {m.family for m in room.materials.values()} for room in rooms)
+
+
+def test_a_new_metric_is_one_like_the_others(tmp_path, monkeypatch):
+    monkeypatch.setattr(registry, "METRICS", dict(registry.METRICS))
+    module = added(tmp_path, "gibench/metrics/log_error.py", monkeypatch, "docs/metrics.md")
+    assert "from gibench.metrics.log_error import log_error as log_error" in page("metrics")
+    ref = np.random.default_rng(0).random((4, 5, 3))
+    twice = 2 * ref + module.EPSILON
+    assert metrics.evaluate(twice, ref, metrics=["log_error"])["log_error"] == pytest.approx(np.log(2))
+    np.testing.assert_allclose(metrics.metric("log_error")(ref, twice, map=True), np.log(2))
 
 
 def rows(text: str, first: str) -> dict[str, set[str]]:

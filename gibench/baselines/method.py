@@ -142,11 +142,11 @@ class Method:
         return {knob.name: (given or {}).get(knob.name, knob.default) for knob in self.knobs}
 
     def baked_settings(self, settings: Mapping[str, Setting]) -> dict[str, Setting]:
-        """Those of the settings that decide what is prepared."""
+        """The settings that decide a preparation."""
         return {knob.name: settings[knob.name] for knob in self.knobs if knob.bakes or knob.trains}
 
     def trained_settings(self, settings: Mapping[str, Setting]) -> dict[str, Setting]:
-        """Those of the settings that decide what is trained."""
+        """The settings that decide a training."""
         return {knob.name: settings[knob.name] for knob in self.knobs if knob.trains}
 
     def load(self) -> type[Implementation]:

@@ -1,4 +1,4 @@
-"""Results as tables: what the board, the plots and the comparisons are made from."""
+"""Results as tables, from which the board, the plots and the comparisons are made."""
 
 from __future__ import annotations
 

@@ -350,7 +350,7 @@ class Run:
         return key not in self.trainings
 
     def trained(self, job: Job, took: dict[str, Any] | None) -> None:
-        """Take what the training took that a result needs; None where it failed."""
+        """Take note of a training that results need. took: its times; None where it failed."""
         self.trainings[key_of_training(job)] = took is not None
         if took is not None:
             self.state.training = took
@@ -362,7 +362,7 @@ class Run:
         return path.exists() and self.folder.read_result(job.id).get("phase") == "train"
 
     def task(self, group: Sequence[Job], scene: SceneFiles | None) -> worker.Task:
-        """What the process of some results of one preparation does; without a scene it trains."""
+        """The task of the process that makes results of one preparation; without a scene it trains."""
         first, order = group[0], self.order
         self.folder.logs.mkdir(exist_ok=True)
         method = first.found.method

@@ -147,7 +147,7 @@ def _new_record(dataset: Dataset) -> dict[str, Any]:
 def _written(
     dataset: Dataset, folder: Path, names: Sequence[str], on_frame: Callable[[int, int], None]
 ) -> dict[str, Any]:
-    """Write the arrays; what the record says of them."""
+    """Write the arrays; returns their entries in the record."""
     width, height = dataset.manifest["recipe"]["resolution"]
     arrays = {name: _Array(folder, name, (len(dataset), height, width)) for name in names}
     try:
@@ -195,7 +195,7 @@ class _Array:
         self.file.write(content.data)
 
     def finished(self) -> dict[str, Any]:
-        """Give the array its name; what the record says of it."""
+        """Give the array its name; returns its entry in the record."""
         self.file.flush()
         os.fsync(self.file.fileno())
         self.file.close()
@@ -298,7 +298,7 @@ def opened_cache(dataset: Dataset) -> FrameCache | None:
 
 
 def _record(root: Path) -> dict[str, Any] | None:
-    """What lies in the cache of a dataset; None where there is none. Raises DatasetError."""
+    """The cache of a dataset; None where there is none. Raises DatasetError."""
     name = f"{CACHE}/{RECORD}"
     try:
         record = parsed(gate.read_inside(root, name), CacheRecord)

@@ -60,7 +60,7 @@ def parsed(content: bytes, model: type[BaseModel]) -> dict[str, Any]:
 
 
 def checked(value: dict[str, Any], model: type[BaseModel]) -> dict[str, Any]:
-    """The same for what is read already."""
+    """The same for values that are parsed already."""
     try:
         model.model_validate(value)
     except ValidationError as problems:

@@ -80,7 +80,7 @@ def _vector(row: Mapping[str, Any], column: str) -> tuple[float, float, float]:
 
 
 def _file(sha256: str) -> str:
-    """The file of a panorama, from the folder of its dataset. Raises `DatasetError` for what is no hash."""
+    """The file of a panorama, from the folder of its dataset. Raises `DatasetError` for a text that is no hash."""
     if not re.fullmatch("[0-9a-f]{64}", sha256):
         raise DatasetError(f"an environment is called {shown(sha256)}, which is no SHA-256")
     return f"{ENVIRONMENTS}/{sha256}.exr"

@@ -44,7 +44,7 @@ class PinholeCamera:
     mirrored: bool = False
 
     def __post_init__(self) -> None:
-        """Raises CameraError for what is no camera. Numbers of NumPy become Python's, which alone Mitsuba takes."""
+        """Raises CameraError for a wrong value. Numbers of NumPy become Python's, which alone Mitsuba takes."""
         for name in ("position", "target", "principal_point", *(["up"] if self.up is not None else [])):
             object.__setattr__(self, name, tuple(float(c) for c in getattr(self, name)))
         object.__setattr__(self, "fov", float(self.fov))

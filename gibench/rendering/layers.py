@@ -1,4 +1,4 @@
-"""Materials made of others: two-sided, masked, blended, bumped. What a surface is made of is what their leaves say.
+"""Materials made of others: two-sided, masked, blended, bumped. Their leaves say what a surface is made of.
 
 Mitsuba's attributes (`BSDF.eval_attribute`) reach through a material that is the same on both sides, and through no
 other. Here the tree below every material is looked at once, and lanes walk down it together.

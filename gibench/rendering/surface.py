@@ -67,7 +67,7 @@ def specular_albedo(scene: Scene, bsdf: Any, si: Any, active: Any) -> Any:
 
 
 def roughness(scene: Scene, bsdf: Any, si: Any, active: Any) -> Any:
-    """GGX alpha: 0 for what is smooth, 1 where there is no specular lobe, 0 on a miss.
+    """GGX alpha: 0 for a smooth surface, 1 where there is no specular lobe, 0 on a miss.
 
     √(αu αv) for an anisotropic lobe. Of several lobes the mean, each weighted by the luminance of its specular albedo.
     """

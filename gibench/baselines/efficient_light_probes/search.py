@@ -120,7 +120,7 @@ class Reflected:
     far: Any
 
     def direction(self, point: Any) -> Any:
-        """Unit mi.Vector3f from points towards what is reflected."""
+        """Unit mi.Vector3f from points towards the reflected point."""
         return dr.select(self.far, mi.Vector3f(self.target), dr.normalize(self.target - point))
 
 

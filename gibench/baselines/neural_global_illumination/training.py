@@ -116,7 +116,7 @@ class Predicting(Learner):
     def __init__(
         self, examples: Examples, judged: Sequence[Example], plan: TrainingPlan, device: str = "cpu"
     ) -> None:
-        """judged: what is held out. Raises WeightsError where LPIPS has none."""
+        """judged: the held-out frames. Raises WeightsError where LPIPS has none."""
         self.examples, self.plan = examples, plan
         with seeded(plan.seed):
             self.network = NeuralGlobalIllumination(plan.size)
@@ -140,7 +140,7 @@ class Predicting(Learner):
         return Example(window.of(inputs), window.of(code), window.of(rest), shown)
 
     def error(self) -> Tensor:
-        """Of what is held out: mean absolute difference of codes."""
+        """The mean absolute difference of codes over the held-out frames."""
         errors = [absolute(self.network(one.inputs[None]), one.code[None]) for one in self.held_out]
         return torch.stack(errors).mean()
 

@@ -51,8 +51,8 @@ def glossy_radiance(scene, portals, layers, lightmap: Lightmap, sampler, si, bsd
         while alive:
             preliminary = scene.ray_intersect_preliminary(ray, coherent=False, active=alive)
             hit = preliminary.compute_surface_interaction(ray, mi.RayFlags.All, alive)
-            share = emission_weight(scene, portals, None, hit, reference, mi.UInt32(0), pdf, delta, alive)
-            emitted = emission(scene, hit, alive) * share
+            mis = emission_weight(scene, portals, None, hit, reference, mi.UInt32(0), pdf, delta, alive)
+            emitted = emission(scene, hit, alive) * mis
             gained = throughput * (emitted + lightmap.diffuse(hit, preliminary, alive))
 
             there = hit.bsdf(ray)

@@ -14,7 +14,7 @@ Ended = Literal["steps", "seconds", "patience", "diverged"]
 
 @dataclass(frozen=True)
 class Look:
-    """One look at what is held out. seconds: of training until then, this look included. loss: mean since the look
+    """The held-out error at a step. seconds: of training until then, this look included. loss: mean since the look
     before it, of the loss to watch; 0 before the first step.
     """
 

@@ -55,7 +55,7 @@ class Learner(ABC):
 
     @abstractmethod
     def error(self) -> float | Tensor:
-        """Of what is held out: ≥ 0, smaller is better. Called in evaluation mode, without gradients."""
+        """The held-out error: ≥ 0, smaller is better. Called in evaluation mode, without gradients."""
 
     @property
     def device(self) -> torch.device:

@@ -19,7 +19,7 @@ CROP = ("crop_offset_x", "crop_offset_y", "crop_width", "crop_height")
 
 @dataclass(frozen=True)
 class Film:
-    """size: (width, height). corner, window: the upper left corner and the size of what is an image of it; pixels."""
+    """size: (width, height). corner, window: upper left corner and size of the part that becomes the image; pixels."""
 
     size: tuple[int, int] = DEFAULT_SIZE
     corner: tuple[int, int] = (0, 0)

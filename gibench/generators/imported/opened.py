@@ -87,7 +87,7 @@ def _cut(
 def _beyond(
     scene: ImportedScene, way: tuple[float, float, float], found: FloatArray
 ) -> dict[str, NDArray[np.bool_]]:
-    """Faces (F,) that lie where the room ends in a direction, or beyond, by shape id; (1,) for what is no mesh."""
+    """Faces (F,) that lie where the room ends in a direction, or beyond, by shape id; (1,) where it is no mesh."""
     towards = np.array(way)
     points = _some(found)
     reach = fan(scene.loaded, points, towards[None])[0][:, 0]

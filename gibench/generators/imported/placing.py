@@ -34,7 +34,7 @@ INTENSITIES = ("point", "spot")
 def up_axis(root: Node, asked: str = "auto") -> str:
     """The axis that is up: what the user says, or else the one that is nearest to the first camera's up; y without one.
 
-    Raises SceneFileError for what is no axis.
+    Raises SceneFileError for a name that is no axis.
     """
     if asked in AXES:
         return asked

@@ -79,7 +79,7 @@ class Guide:
         return dr.gather(mi.UInt32, self._rows, place, active & inside)
 
     def fraction(self, row, bsdf, active):
-        """Probability that a bounce is the guide's: 0 for what is not diffuse, which knows better itself."""
+        """Probability that a bounce is the guide's: 0 without a diffuse lobe, where the BSDF samples better."""
         diffuse = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.DiffuseReflection)
         return dr.gather(mi.Float, self._fraction, row, diffuse)
 
