@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from functools import lru_cache, partial
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -128,8 +128,7 @@ class RelitByNetwork(DirectLight):
         self.network = network.eval().requires_grad_(False).to(torch_device())
         self._surfaces = DeviceFrames(site.scene, SURFACE)
         self._scored = set(site.parts)
-        # An environment that stays from frame to frame is taken once.
-        self._light = lru_cache(maxsize=1)(self.light_of)
+        self._last: tuple[EnvironmentMap, Light] | None = None
 
     def render(self, view: View, stages: Stages) -> Prediction:
         """Direct light, and what the network says of every pixel that sees a surface."""
@@ -140,7 +139,10 @@ class RelitByNetwork(DirectLight):
         with stages.stage("g-buffer"):
             images = self._surfaces.read(view.camera, view.resolution)
         with stages.stage("light"), torch.inference_mode():
-            told = self.told(self._light(environment))
+            # One that stays from frame to frame is taken once.
+            if self._last is None or self._last[0] != environment:
+                self._last = environment, self.light_of(environment)
+            told = self.told(self._last[1])
         with stages.stage("inference"), torch.inference_mode():
             indirect = self.indirect(images, view, told)
         with stages.stage("denoising"):

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import gc
+import weakref
 
 import numpy as np
 import pytest
@@ -139,6 +141,20 @@ def test_pixels_that_see_no_surface_have_no_indirect_light(rig, method):
 
 def test_a_frame_of_another_size(rig, method):
     frame(rig, method, environment(noise()), resolution=(120, 96))
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_it_goes_when_nobody_holds_it(rig, name, tmp_path):
+    """It holds the scene, which must not be left to the collector of cycles."""
+    method = prepared(name, rig, tmp_path)
+    frame(rig, method, environment(noise()))
+    held = weakref.ref(method)
+    gc.disable()
+    try:
+        del method
+        assert held() is None
+    finally:
+        gc.enable()
 
 
 def test_denoising_changes_indirect_light_too(rig, method):
