@@ -37,18 +37,21 @@ def rig():
     return strips_rig()
 
 
-@pytest.fixture(scope="module")
-def method(rig, tmp_path_factory):
+def untrained(rig, folder):
+    """The method with networks that have learned nothing."""
     running = RepresentedLight(METHOD.settings({"network": "small", "rays": 1, "observed": 4}))
-    running.observe(
-        dataclasses.replace(site(rig.scene, tmp_path_factory.mktemp("cnnr")), rig=rig), CAMERAS, MEASURE
-    )
+    running.observe(dataclasses.replace(site(rig.scene, folder), rig=rig), CAMERAS, MEASURE)
     torch.manual_seed(0)
     poses = torch.stack([pose(camera, MEASURE) for camera in CAMERAS])
     network = Represented(SMALL, running.observed.fixed(MEASURE).cpu(), poses)
     torch.nn.init.constant_(network.generator.last.bias, 0.5)
     running.use(network)
     return running
+
+
+@pytest.fixture(scope="module")
+def method(rig, tmp_path_factory):
+    return untrained(rig, tmp_path_factory.mktemp("cnnr"))
 
 
 def frame(rig, method, light, resolution=RESOLUTION, camera=CAMERA):

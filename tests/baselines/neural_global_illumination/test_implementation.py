@@ -31,16 +31,19 @@ def rig():
     return strips_rig()
 
 
-@pytest.fixture(scope="module")
-def weights(tmp_path_factory):
-    """Of a network that has learned nothing."""
-    folder = tmp_path_factory.mktemp("weights")
+def untrained(folder):
+    """The weights of a network that has learned nothing."""
     torch.manual_seed(0)
     network = NeuralGlobalIllumination(SMALL)
     facts = Measure((0.0, 0.0, 1.0), (2.0, 2.0, 1.0), 0.1, 0.05).facts()
     write_tensors(folder / WEIGHTS, {"weights": {"network": network.state_dict()}, "facts": facts})
     (folder / RECORD).write_text("{}")
     return folder
+
+
+@pytest.fixture(scope="module")
+def weights(tmp_path_factory):
+    return untrained(tmp_path_factory.mktemp("weights"))
 
 
 def prepared(rig, weights, folder):

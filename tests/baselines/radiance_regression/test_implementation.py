@@ -31,10 +31,8 @@ def rig():
     return strips_rig()
 
 
-@pytest.fixture(scope="module")
-def weights(tmp_path_factory):
-    """Of networks that have learned nothing, over half of the room."""
-    folder = tmp_path_factory.mktemp("weights")
+def untrained(folder):
+    """The weights of networks that have learned nothing, over half of the room."""
     torch.manual_seed(0)
     place = torch.rand(2000, 3) * torch.tensor([1.5, 3.0, 2.0]) - torch.tensor([1.5, 1.5, 0.0])
     partition = partitioned(place, place, 8)
@@ -45,6 +43,11 @@ def weights(tmp_path_factory):
     write_tensors(folder / WEIGHTS, {"weights": content, "facts": facts})
     (folder / RECORD).write_text("{}")
     return folder
+
+
+@pytest.fixture(scope="module")
+def weights(tmp_path_factory):
+    return untrained(tmp_path_factory.mktemp("weights"))
 
 
 def prepared(rig, weights, folder):
