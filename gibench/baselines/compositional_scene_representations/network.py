@@ -28,6 +28,9 @@ PIXEL = 16
 LAYERS = 10
 """Of the generator."""
 
+CALM = 0.1
+"""Of the first weights of its last layer: the network begins near the mean light."""
+
 
 @dataclass(frozen=True)
 class Size:
@@ -77,7 +80,13 @@ class Generator(nn.Module):
         befores = [given] + [given + size.width] * (LAYERS - 1)
         self.layers = nn.ModuleList(nn.Conv2d(before, size.width, 1) for before in befores)
         self.last = nn.Conv2d(size.width, 3, 1)
-        nn.init.zeros_(self.last.bias)  # type: ignore[arg-type]
+        with torch.no_grad():
+            self.last.weight *= CALM
+
+    def begin_at(self, code: Tensor) -> None:
+        """Begin with about the same code (3,) everywhere: the mean of what is to be learned."""
+        with torch.no_grad():
+            self.last.bias.copy_(code)  # type: ignore[union-attr]
 
     def forward(self, pixels: Tensor, represented: Tensor) -> Tensor:
         """(N, PIXEL, H, W) and (N, represented) to (N, 3, H, W)."""

@@ -115,6 +115,9 @@ class Representing(Learner):
         self.examples, self.plan = examples, plan
         with seeded(plan.seed):
             self.network = Represented(plan.size, fixed.cpu(), poses.cpu())
+        self.network.generator.begin_at(
+            torch.stack([one.truth.mean(dim=(1, 2)) for one in judged]).mean(dim=0)
+        )
         self.network.to(device)
         self.held_out = [Example(*(part.to(device) for part in one)) for one in judged]
         optimiser = torch.optim.Adam(self.network.parameters(), lr=RATES[plan.network])

@@ -44,7 +44,7 @@ def untrained(rig, folder):
     torch.manual_seed(0)
     poses = torch.stack([pose(camera, MEASURE) for camera in CAMERAS])
     network = Represented(SMALL, running.observed.fixed(MEASURE).cpu(), poses)
-    torch.nn.init.constant_(network.generator.last.bias, 0.5)
+    network.generator.begin_at(torch.full((3,), 0.5))
     running.use(network)
     return running
 

@@ -29,7 +29,7 @@ class Made(KeptExamples[Example]):
     def made(self, index):
         self.times += 1
         generator = torch.Generator().manual_seed(index)
-        pixels = torch.rand(PIXEL, 32, 32, generator=generator)
+        pixels = torch.rand(PIXEL, 16, 16, generator=generator)
         bright = torch.full((OBSERVATIONS, 3, SIDE, SIDE), 0.5 * index)
         return Example(bright, pixels, 0.4 * index * pixels[9:12])
 
@@ -48,7 +48,7 @@ def learnt(steps):
 
 
 def test_it_learns_and_repeats_to_the_bit():
-    first, again = learnt(12), learnt(12)
+    first, again = learnt(30), learnt(30)
     assert first.best.error < 0.7 * first.curve[0].error
     for name, tensor in first.weights["network"].items():
         assert torch.equal(tensor, again.weights["network"][name])
