@@ -126,4 +126,4 @@ def _shown(out: Path, name: str, picture: Image.Image, title: str) -> list[str]:
     content = io.BytesIO()
     picture.save(content, "jpeg", quality=QUALITY, optimize=True)
     write_whole(out / f"{name}.jpg", content.getvalue())
-    return ["", title, "", f"![{title}]({name}.jpg)"]
+    return ["", title, "", f"[![{title}]({name}.jpg)]({name}.jpg)"]

@@ -21,6 +21,6 @@ def test_every_picture_has_a_recipe_and_a_title():
 def test_a_wide_picture_is_made_narrow_and_named_on_the_page(tmp_path):
     wide = Image.fromarray(np.full((100, 3200, 3), 128, dtype=np.uint8))
     lines = gallery._shown(tmp_path, "rooms", wide, "Rooms.")
-    assert "![Rooms.](rooms.jpg)" in lines
+    assert "[![Rooms.](rooms.jpg)](rooms.jpg)" in lines
     with Image.open(tmp_path / "rooms.jpg") as picture:
         assert picture.size == (gallery.WIDEST, 50)

@@ -65,10 +65,11 @@ def test_the_file_keeps_what_half_floats_cannot(tmp_path, low, high, dtype):
 
 def test_agrees_with_the_path_tracer_in_a_furnished_room(tmp_path):
     """The diffuse channels of a generated room, in blocks of pixels, against noise and texture in them."""
-    write_room(sampled := sample_room(3, 0), tmp_path)
+    # A small one: most of the time goes into filtering charts, of which it has few.
+    sampled = sample_room(2, 0, kind="bathroom", width=3.0, depth=3.5, height=2.3, views=1)
+    write_room(sampled, tmp_path)
     scene = load_scene(tmp_path / "scene.xml")
-    camera = sampled.cameras[0]
-    camera = PinholeCamera(tuple(camera.position), tuple(camera.target), camera.fov)
+    camera = sampled.cameras[0].pinhole
     options = {"resolution": (64, 48), "channels": ["radiance"], "spp": 256}
     truth = render_frame(scene, camera, **options).arrays
     wanted = truth["emission"] + truth["direct_diffuse"] + truth["indirect_diffuse"]
@@ -79,7 +80,7 @@ def test_agrees_with_the_path_tracer_in_a_furnished_room(tmp_path):
     bias = blocks[0].mean() / blocks[1].mean() - 1
     error = np.sqrt(np.mean((blocks[0] - blocks[1]) ** 2)) / blocks[1].mean()
     print(f"bias {bias:.3f}, relative error of blocks {error:.3f}")
-    # Over seeds of the bake the bias spreads by some 1.5 %: much of the light is a desk lamp's.
+    # In a larger room the bias spread by some 1.5 % over seeds of the bake.
     assert abs(bias) < 0.04
     assert error < 0.1
 
