@@ -170,9 +170,13 @@ def rays_of_a_step() -> list[tuple[tuple[float, ...], tuple[float, ...]]]:
 
 
 def looked_up(grid: dict[str, Any], state: list[Any], point: Any, direction: Any, active: Any) -> Any:
-    """Intensity towards a direction at points, interpolated between the middles of cells: mi.Color3f ≥ 0, W/sr."""
+    """Intensity towards a direction at points, interpolated between the middles of cells: mi.Color3f ≥ 0, W/sr.
+
+    Half a cell around the volume it is that of the outermost cells; beyond, such as behind a window, there is none.
+    """
     at = (mi.Point3f(point) - grid["low"]) / grid["side"] - 0.5
     last = mi.Vector3f(grid["counts"]) - 1
+    active = active & dr.all((at >= -1) & (at <= last + 1))
     at = dr.clip(dr.select(active, at, 0), 0, last)
     corner = dr.minimum(dr.floor(at), dr.maximum(last - 1, 0))
     share = at - corner

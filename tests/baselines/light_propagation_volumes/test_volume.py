@@ -213,10 +213,10 @@ def test_a_grid_fills_its_box_and_has_no_cell_too_many():
     assert flat.counts == (8, 1, 1)
 
 
-def test_lookups_interpolate_and_end_at_the_last_cell():
+def test_lookups_interpolate_and_end_half_a_cell_beyond_the_last():
     state = [dr.zeros(mi.Float, GRID.size) for _ in range(COMPONENTS)]
     state[0] = mi.Float(dr.arange(mi.UInt32, GRID.size) % 9)  # rises along x
-    places = {0.0: 0.0, 0.125: 0.0, 0.5: 1.5, 1.0: 3.5, 2.25: 8.0, 50.0: 8.0, -50.0: 0.0}
+    places = {0.0: 0.0, 0.125: 0.0, 0.5: 1.5, 1.0: 3.5, 2.25: 8.0, 2.35: 8.0, 2.4: 0.0, 50.0: 0.0, -50.0: 0.0}
     points = np.array([[-1.0 + x, -1.0, 1.0] for x in places], dtype=np.float32)
     found = looked_up(GRID.arrays, state, mi.Point3f(points.T.copy()), mi.Vector3f(0, 0, 1), mi.Bool(True))
     assert np.array(found.x) == pytest.approx(list(places.values()), abs=1e-5)
