@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from gibench.baselines.linearly_transformed_cosines import SHADOWS
 from gibench.baselines.method import Knob, Method
-
-SURFACE = ("position", "normal", "albedo", "specular_albedo", "roughness")
-"""Channels of what is seen, that the pixel generator is given."""
+from gibench.baselines.moving_light import LIT, SURFACE
 
 METHOD = Method(
     id="cnnr",
@@ -15,13 +13,7 @@ METHOD = Method(
     tracks=("moving-light",),
     paper="Granskog et al. 2020, Compositional Neural Scene Representations for Shading Inference",
     implementation="gibench.baselines.compositional_scene_representations.implementation:RepresentedLight",
-    channels=(
-        "direct_diffuse",
-        "direct_specular",
-        "indirect_diffuse",
-        "indirect_specular",
-        *SURFACE,
-    ),
+    channels=(*LIT, *SURFACE),
     knobs=(
         Knob("network", "full", ("small", "full"), "0.39 or 5.76 million parameters", bakes=True),
         Knob("observed", 16, (4, 16, 64), "paths a pixel of each of the three images", bakes=True),

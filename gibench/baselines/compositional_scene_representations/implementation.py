@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from gibench.baselines.compositional_scene_representations import METHOD, SURFACE
+from gibench.baselines.compositional_scene_representations import METHOD
 from gibench.baselines.compositional_scene_representations.network import Represented
 from gibench.baselines.compositional_scene_representations.observations import (
     LARGEST,
@@ -27,6 +27,7 @@ from gibench.baselines.compositional_scene_representations.training import (
 from gibench.baselines.image_to_image.frames import Frames, held_out
 from gibench.baselines.linearly_transformed_cosines.implementation import area_light
 from gibench.baselines.method import MethodError, Prediction, Setting, Site, View, reading
+from gibench.baselines.moving_light import SURFACE
 from gibench.baselines.moving_light.lit_frames import LitFrames
 from gibench.baselines.moving_light.measure import HELD_OUT, JUDGED, Measure, area_of, measured
 from gibench.baselines.sources import digest

@@ -4,19 +4,12 @@ from __future__ import annotations
 
 from gibench.baselines.linearly_transformed_cosines import SHADOWS
 from gibench.baselines.method import Knob, Method, Variant
+from gibench.baselines.moving_light import LIT
+from gibench.baselines.moving_light import SURFACE as LIT_SURFACE
 from gibench.rendering.channels import CUES
 
-SURFACE = (
-    "position",
-    "normal",
-    "albedo",
-    "specular_albedo",
-    "roughness",
-    "reflected_position",
-    "reflected_normal",
-    "reflected_albedo",
-)
-"""Channels of what is seen, that the network is given."""
+SURFACE = (*LIT_SURFACE, "reflected_position", "reflected_normal", "reflected_albedo")
+"""Channels of what is seen and of what it mirrors, that the network is given."""
 
 METHOD = Method(
     id="ngi",
@@ -26,15 +19,7 @@ METHOD = Method(
     paper="Gao et al. 2022, Neural Global Illumination: Interactive Indirect Illumination Prediction under Dynamic "
     "Area Lights",
     implementation="gibench.baselines.neural_global_illumination.implementation:NeuralLight",
-    channels=(
-        "color",
-        "direct_diffuse",
-        "direct_specular",
-        "indirect_diffuse",
-        "indirect_specular",
-        *SURFACE,
-        *CUES,
-    ),
+    channels=("color", *LIT, *SURFACE, *CUES),
     knobs=(
         Knob(
             "network", "full", ("small", "full"), "1.20 or the paper's 14.65 million parameters", trains=True

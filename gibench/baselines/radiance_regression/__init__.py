@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from gibench.baselines.linearly_transformed_cosines import SHADOWS
 from gibench.baselines.method import Knob, Method
-
-SURFACE = ("position", "normal", "albedo", "specular_albedo", "roughness")
-"""Channels of what is seen, that the networks are given."""
+from gibench.baselines.moving_light import LIT, SURFACE
 
 METHOD = Method(
     id="rrf",
@@ -15,13 +13,7 @@ METHOD = Method(
     tracks=("moving-light",),
     paper="Ren et al. 2013, Global Illumination with Radiance Regression Functions",
     implementation="gibench.baselines.radiance_regression.implementation:RegressedLight",
-    channels=(
-        "direct_diffuse",
-        "direct_specular",
-        "indirect_diffuse",
-        "indirect_specular",
-        *SURFACE,
-    ),
+    channels=(*LIT, *SURFACE),
     knobs=(
         Knob("cells", 1024, (16, 64, 256, 1024), "parts of the room, a network of 52 kB each", trains=True),
         *SHADOWS,

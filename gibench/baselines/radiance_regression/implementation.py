@@ -9,9 +9,10 @@ import torch
 from gibench.baselines.image_to_image.frames import Frames, held_out
 from gibench.baselines.linearly_transformed_cosines.implementation import area_light
 from gibench.baselines.method import MethodError, Prediction, Setting, Site, Training, View, reading
+from gibench.baselines.moving_light import SURFACE
 from gibench.baselines.moving_light.lit_frames import LitFrames
 from gibench.baselines.moving_light.measure import HELD_OUT, JUDGED, Measure, measured
-from gibench.baselines.radiance_regression import METHOD, SURFACE
+from gibench.baselines.radiance_regression import METHOD
 from gibench.baselines.radiance_regression.network import CellNetworks
 from gibench.baselines.radiance_regression.partition import Partition
 from gibench.baselines.radiance_regression.training import (
