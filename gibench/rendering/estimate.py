@@ -341,7 +341,7 @@ def estimate_radiance(
     if max_depth < 0:
         raise EstimateError(f"max_depth is {max_depth}: it counts scattering events, from 0")
 
-    _ = scene.guide  # learned before the clock of the kernels runs
+    _ = scene.guide, scene.portals  # learned before the clock of the kernels runs
     width, height = resolution
     estimate = Estimate(width * height, group_levels(spp if spp is not None else ROUND))
     goal = spp if spp is not None else spp_cap - spp_cap % ROUND

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 PORTAL_FRACTION = 0.5
-"""Of the light samples that go through portals where there are any. The environment has half of the rest."""
+"""Of the light samples that go through portals where nothing is learned. The environment has half of the rest."""
 
 _COLUMNS = 19
 
@@ -40,7 +40,7 @@ class Portals:
         areas = np.linalg.norm(normal, axis=1)
         total = float(areas.sum())
         self._count = mi.UInt32(len(rectangles))
-        self._any = len(rectangles) > 0
+        self.lead_outside = len(rectangles) > 0
         self.open(True)
         self._inverse_area = mi.Float(1 / total if total > 0 else 0.0)
         self.environment = mi.EmitterPtr(environment)
@@ -62,7 +62,11 @@ class Portals:
 
     def open(self, bright: bool) -> None:
         """Sample through the portals where the environment is bright, and not where it is dark."""
-        self.fraction = mi.Float(PORTAL_FRACTION if bright and self._any else 0.0)
+        self.send(PORTAL_FRACTION if bright and self.lead_outside else 0.0)
+
+    def send(self, fraction: float) -> None:
+        """Let this share of the light samples go through the portals, in [0, 1)."""
+        self.fraction = mi.Float(fraction)
         dr.make_opaque(self.fraction)
 
     @property
@@ -84,21 +88,32 @@ class Portals:
         return dr.gather(mi.Float, self._table, portal * _COLUMNS + _COLUMNS - 1)
 
     @dr.syntax
+    def _chosen(self, u):
+        """A portal, in proportion to its area, and a number in [0, 1] that is left of u in [0, 1)."""
+        portal, before, after = mi.UInt32(0), mi.Float(0), self._end(mi.UInt32(0))
+        while (u >= after) & (portal + 1 < self._count):
+            portal += 1
+            before = mi.Float(after)
+            after = self._end(portal)
+        return portal, dr.clip((u - before) / dr.maximum(after - before, 1e-20), 0, 1)
+
     def sample(self, point, u):
         """Directions from points through the portals: unit mi.Vector3f, zero where the point lies behind its portal.
 
         u: mi.Point2f in [0, 1)², of which the first also chooses the portal.
         """
-        portal, before, after = mi.UInt32(0), mi.Float(0), self._end(mi.UInt32(0))
-        while (u.x >= after) & (portal + 1 < self._count):
-            portal += 1
-            before = mi.Float(after)
-            after = self._end(portal)
-        along = dr.clip((u.x - before) / dr.maximum(after - before, 1e-20), 0, 1)
+        portal, along = self._chosen(u.x)
         target = self._row(portal, 0) + along * self._row(portal, 3) + u.y * self._row(portal, 6)
         direction = dr.normalize(target - point)
         in_front = dr.dot(direction, self._row(portal, 9)) < 0
         return dr.select(in_front & dr.all(dr.isfinite(direction)), direction, 0)
+
+    def entrance(self, u):
+        """Points on the portals and their normals, which point inside. u: as for `sample`."""
+        portal, along = self._chosen(u.x)
+        return self._row(portal, 9), self._row(portal, 0) + along * self._row(portal, 3) + u.y * self._row(
+            portal, 6
+        )
 
     @dr.syntax
     def density(self, point, direction):

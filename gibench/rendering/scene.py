@@ -74,12 +74,25 @@ class Scene:
 
     @cached_property
     def portals(self) -> Any:
-        """`portals.Portals` of the openings; None where none are known, or under the scalar variant."""
+        """`portals.Portals` of the openings; None where none are known, or under the scalar variant.
+
+        Under plain sampling and a light that stays, they have the share of the samples that pays in this room
+        (`portal_share`), and are None where that is none. A guide knows better, place by place.
+        """
         if self.openings is None or is_scalar():
             return None
         from gibench.rendering.portals import Portals
 
-        return Portals(self.mi_scene, self.openings)
+        portals = Portals(self.mi_scene, self.openings)
+        if self.sampling != PLAIN or self.lights is not None:
+            return portals
+        if not portals.lead_outside:
+            return None
+        from gibench.rendering.portal_share import portal_share
+
+        share = portal_share(self.mi_scene, portals)
+        portals.send(share)
+        return portals if share > 0 else None
 
     @cached_property
     def guide(self) -> Any:
