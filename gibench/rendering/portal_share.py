@@ -25,7 +25,7 @@ SHARES = (0.0, 0.125, 0.25, 0.375, 0.5)
 """That are compared."""
 
 COST = 1.12
-"""CPU time of a path with portals over that without."""
+"""CPU time of a path with portals over that without, geometric mean of eight rooms."""
 
 LANES = 1 << 16
 
@@ -35,8 +35,9 @@ BOUNCES = 3
 CELLS = 1000
 """Places over which the mean light is taken, to which its noise is relative."""
 
-DARK = 0.01
-"""Share of the mean light of all places, squared, that is added to that of one."""
+DARK = 0.3
+"""Share of the mean light of all places, squared, that is added to that of one: bright places make the noise of
+all that they light. With it the rooms by day are in the order of their measured gain."""
 
 
 def portal_share(mi_scene: Any, portals: Any) -> float:
