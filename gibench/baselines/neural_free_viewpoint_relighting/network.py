@@ -59,21 +59,30 @@ class Size:
 FULL = Size(levels=32, features=2, growth=1.3, mixed=64, hidden=128)
 """Of the paper: 107 MB of hash grid with tables of 2¹⁹ entries, 6.1 MB of wavelets, 64 × 64, 124 KB (section 5)."""
 
-SMALL = Size(levels=16, features=2, growth=1.3, mixed=32, hidden=64)
+SMALL = Size(levels=16, features=2, growth=1.2, mixed=32, hidden=64)
 """For processors without a GPU."""
 
 
 class HashField(nn.Module):
-    """Features of places in the unit cube."""
+    """Features of places in the unit cube.
+
+    Those of a level are divided by the square root of its resolution, in cells of the coarsest one. Adam moves an entry
+    that one pixel has seen as far as one that a thousand have: without this, fine levels are grain for as long as a
+    processor has time to train. What can be learned is the same.
+    """
+
+    shares: Tensor
 
     def __init__(self, size: Size, table: int) -> None:
         """table: binary logarithm of the entries of a level."""
         super().__init__()
         self.grid = HashGrid(levels=size.levels, features=size.features, table=2**table, growth=size.growth)
+        shares = size.growth ** (-0.5 * torch.arange(size.levels, dtype=torch.float32))
+        self.register_buffer("shares", shares.repeat_interleave(size.features), persistent=False)
 
     def forward(self, points: Tensor) -> Tensor:
         """(…, 3) in [0, 1] to (…, M)."""
-        features: Tensor = self.grid(points)
+        features: Tensor = self.grid(points) * self.shares
         return features
 
 
