@@ -201,14 +201,17 @@ def print_methods(track: str | None) -> None:
 
 
 def print_methods_compared(results: Results, first: str, second: str) -> None:
-    """Print the paired comparison of two methods of a run, a row a metric and part."""
+    """Print the paired comparison of two methods of a run, a row a metric and part: the track's, then others scored."""
     one, other = _one_label(results, first), _one_label(results, second)
     _row("first", one)
     _row("second", other)
     _times(results, one, results, other)
     _head("metric")
+    names = dict.fromkeys(
+        [*results.run["metrics"], *results.run["sequence_metrics"], *results.frames["metric"]]
+    )
     for part in results.run["parts"]:
-        for name in [*results.run["metrics"], *results.run["sequence_metrics"]]:
+        for name in names:
             _compared(f"{name} {part}", results, one, results, other, name, part)
 
 

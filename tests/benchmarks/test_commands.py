@@ -162,6 +162,7 @@ def test_from_a_run_to_comparisons(capsys, tmp_path, track, scenes_only):
     said = capsys.readouterr().out
     assert re.search(r"rmse full +-0\.2\d .* better$", said, re.M)
     assert re.search(r"rmse specular +not compared: ", said)
+    assert re.search(r"psnr full +[+-]", said)  # none of the track's
     assert max(map(len, said.splitlines())) <= 80
     assert re.search(r"times +\d+\.\d and \d+\.\d ms, prepared in", said)
     assert run(app, ["bench", "compare", str(scenes_only), str(scenes_only)]) == 0
