@@ -98,9 +98,9 @@ def _points(mi_scene, portals):
 
 def _places(position: NDArray[Any], normal: NDArray[Any]) -> NDArray[np.int64]:
     """Number of the place of each point, of a grid over nearly all of them."""
-    if not len(position):
-        return np.zeros(0, dtype=np.int64)
-    grid = Grid(*np.quantile(position, (0.02, 0.98), axis=0), cells=CELLS)
+    if not len(position) or not np.ptp(low_high := np.quantile(position, (0.02, 0.98), axis=0), axis=0).any():
+        return np.zeros(len(position), dtype=np.int64)
+    grid = Grid(*low_high, cells=CELLS)
     place, _ = grid.place(mi.Point3f(position.T), mi.Vector3f(normal.T), mi.Vector3f(0))
     return np.array(place).astype(np.int64)
 
