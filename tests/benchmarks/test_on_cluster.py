@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import psutil
 import pytest
@@ -21,10 +23,12 @@ from gibench.benchmarks.running import run
 from gibench.cli import bench_printing
 from gibench.datasets import cluster_opening
 from gibench.datasets.errors import ClusterError, FolderError, MakingError
+from gibench.errors import GibenchError
 from tests.benchmarks import toys
 from tests.benchmarks.conftest import order
 from tests.benchmarks.test_training_on_rooms import track
 from tests.clusters import ENVIRONMENT, killed, scheduler, wait_until, worker
+from tests.datasets.disks import small_disk
 
 pytest.importorskip("distributed")
 
@@ -109,6 +113,23 @@ def test_what_goes_wrong_in_a_process_is_a_result_and_a_full_disk_stops_the_run(
         run(scenes_only, full)
     assert left_behind(scenes_only) == []
     assert len(RunFolder(scenes_only).ids()) == 3
+
+
+def test_a_disk_that_is_full_in_truth(workplace, made, scenes_only, tmp_path):
+    """Here and for the workers; elsewhere the failure above stands for it."""
+    files = [path.stat().st_size for path in scenes_only.rglob("*") if path.is_file()]
+    with small_disk(tmp_path / "disk", kilobytes=2000 + sum(size // 1024 + 4 for size in files)) as disk:
+        root = Path(shutil.copytree(scenes_only, disk / "run"))
+        (disk / "other").write_bytes(bytes(shutil.disk_usage(disk).free - 12 * 1024))
+        asked = order(toys.PLAIN, overrides=OVERRIDES, cluster=str(workplace))
+        with pytest.raises(GibenchError, match="the disk is full: free some space"):
+            run(root, asked)
+        assert left_behind(root) == []
+        (disk / "other").unlink()
+        report = run(root, asked)
+        local = files_of(RunFolder(made[0]))
+        assert files_of(RunFolder(root)) == {id: local[id] for id in report.ids}
+        assert left_behind(root) == []
 
 
 #: One result comes, the next one never does.
