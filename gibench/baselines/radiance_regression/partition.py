@@ -147,7 +147,8 @@ def _split(points: Tensor) -> tuple[int, float, float, Tensor] | None:
     upper = place > plane
     if not upper.any():  # more than half of them at the upper end
         upper = place >= plane
-    if upper.all() or not upper.any():
+    above = int(upper.sum())
+    if min(above, len(points) - above) < FEWEST:
         return None
     low, high = place[~upper].max(), place[upper].min()
     plane = 0.5 * (float(low) + float(high))

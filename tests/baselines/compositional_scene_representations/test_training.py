@@ -49,7 +49,7 @@ def learnt(steps):
 
 def test_it_learns_and_repeats_to_the_bit():
     first, again = learnt(30), learnt(30)
-    assert first.best.error < 0.7 * first.curve[0].error
+    assert first.best.error < 0.8 * first.curve[0].error
     for name, tensor in first.weights["network"].items():
         assert torch.equal(tensor, again.weights["network"][name])
 

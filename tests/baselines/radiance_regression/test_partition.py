@@ -87,6 +87,9 @@ def test_a_flat_room_and_one_with_most_points_at_its_end():
     heap[500:] = heap[:500].amax(dim=0)
     partition = partitioned(heap, codes_of(heap), 4)
     torch.testing.assert_close(whole(partition.pairs(heap), len(heap)), torch.ones(len(heap)))
+    beside = torch.zeros(1000, 3)
+    beside[:5, 0] = 1  # too few to be a part
+    assert partitioned(beside, codes_of(beside), 4).cells == 1
 
 
 def test_splits_repeat():
