@@ -111,7 +111,8 @@ def _remeshed(part: trimesh.Trimesh, edge: float) -> Mesh:
         import pymeshlab
     except ImportError as problem:
         raise RemeshingError(
-            f"pymeshlab does not load ({problem}): pip install 'gibench[bench]' brings it"
+            f"pymeshlab does not load ({problem}): pip install 'gibench[bench]' brings it, and on a machine without a "
+            "desktop `apt install libopengl0 libgl1` what it links to"
         ) from problem
     tool = pymeshlab.MeshSet()
     tool.add_mesh(pymeshlab.Mesh(part.vertices.astype(np.float64), part.faces.astype(np.int32)))
