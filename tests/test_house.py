@@ -138,6 +138,18 @@ def test_lights_are_sampled_in_one_place():
         assert not found or path.name in own, f"{path.relative_to(PACKAGE)} calls {found}"
 
 
+def test_processes_are_started_in_one_place():
+    """`gibench.processes` says how one is heard, given up and ended; those of torch's loader are torch's."""
+    for path in PACKAGE.rglob("*.py"):
+        spawns = [
+            node
+            for node in ast.walk(ast.parse(path.read_text()))
+            if isinstance(node, ast.Attribute) and node.attr in ("get_context", "Process", "Popen", "fork")
+            if isinstance(node.value, ast.Name) and node.value.id in ("multiprocessing", "subprocess", "os")
+        ]
+        assert not spawns or path.name == "processes.py", f"{path.relative_to(PACKAGE)} starts processes"
+
+
 def test_torch_computes_where_the_variant_does():
     """Whether there is a GPU decides nothing by itself, or methods of one board would run on two devices."""
     for path in (PACKAGE / "baselines").rglob("*.py"):
