@@ -128,6 +128,9 @@ def test_names_are_the_fields():
 def test_lights_are_sampled_in_one_place():
     """Methods and references share `rendering.light_sampling`; one that samples by itself has other noise than they."""
     own = {"light_sampling.py", "guide.py"}
+    asks = {
+        "portal_share.py"
+    }  # for the densities of shares that it compares; its samples are those of the others
     for path in PACKAGE.rglob("*.py"):
         calls = {
             node.func.attr
@@ -135,6 +138,8 @@ def test_lights_are_sampled_in_one_place():
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)
         }
         found = calls & {"sample_emitter_direction", "pdf_emitter_direction"}
+        if path.name in asks:
+            found -= {"pdf_emitter_direction"}
         assert not found or path.name in own, f"{path.relative_to(PACKAGE)} calls {found}"
 
 

@@ -20,8 +20,8 @@ from gibench.baselines.compositional_scene_representations.observations import (
 from gibench.baselines.compositional_scene_representations.training import (
     Example,
     Examples,
-    Plan,
     Representing,
+    TrainingPlan,
     described,
 )
 from gibench.baselines.image_to_image.frames import Frames, held_out
@@ -68,7 +68,7 @@ class RepresentedLight:
         seen = site.bakes.get("observations", key, lambda folder: self._observed_all(site, frames, folder))
         with reading("the observations", seen.folder):
             light = torch.from_numpy(np.load(seen.folder / LIGHT))
-        plan = Plan.of(self.settings, site.seed, site.seconds)
+        plan = TrainingPlan.of(self.settings, site.seed, site.seconds)
 
         def make(folder: Path) -> float:
             of = [

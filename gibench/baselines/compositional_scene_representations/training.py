@@ -80,7 +80,7 @@ class Examples(KeptExamples[Example]):
 
 
 @dataclass(frozen=True)
-class Plan:
+class TrainingPlan:
     """What decides a training, beside its frames. seconds: None for STEPS."""
 
     network: str
@@ -89,9 +89,9 @@ class Plan:
     seconds: float | None
 
     @staticmethod
-    def of(settings: Mapping[str, Setting], seed: int, seconds: float | None) -> Plan:
+    def of(settings: Mapping[str, Setting], seed: int, seconds: float | None) -> TrainingPlan:
         """From the settings of the method."""
-        return Plan(str(settings["network"]), int(settings["crop"]), seed, seconds)
+        return TrainingPlan(str(settings["network"]), int(settings["crop"]), seed, seconds)
 
     @property
     def size(self) -> Size:
@@ -108,7 +108,7 @@ class Representing(Learner):
         judged: Sequence[Example],
         fixed: Tensor,
         poses: Tensor,
-        plan: Plan,
+        plan: TrainingPlan,
         device: str = "cpu",
     ) -> None:
         """judged: what is held out. fixed, poses: see `network.Represented`."""

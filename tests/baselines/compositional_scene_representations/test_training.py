@@ -8,8 +8,8 @@ from gibench.baselines.compositional_scene_representations import METHOD
 from gibench.baselines.compositional_scene_representations.network import OBSERVATIONS, PIXEL, SIDE
 from gibench.baselines.compositional_scene_representations.training import (
     Example,
-    Plan,
     Representing,
+    TrainingPlan,
     described,
 )
 from gibench.baselines.moving_light.kept import KeptExamples
@@ -38,7 +38,7 @@ def learner():
     settings = METHOD.settings({"network": "small", "crop": 32})
     fixed, poses = torch.zeros(OBSERVATIONS, 7, SIDE, SIDE), torch.zeros(OBSERVATIONS, 16)
     made = Made()
-    return Representing(made, [made[1], made[4]], fixed, poses, Plan.of(settings, 3, 1.0))
+    return Representing(made, [made[1], made[4]], fixed, poses, TrainingPlan.of(settings, 3, 1.0))
 
 
 def learnt(steps):
