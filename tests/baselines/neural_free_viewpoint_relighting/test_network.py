@@ -81,8 +81,8 @@ def test_light_is_linear():
     a, b, both, twice = (
         net.frame(points, material, places, weights) for weights in (one, other, one + other, 2 * one)
     )
-    assert torch.equal(twice, 2 * a)
     scale = both.abs().max()
+    assert (twice - 2 * a).abs().max() <= 1e-6 * scale
     assert (a + b - both).abs().max() <= 1e-5 * scale
     # The order of the wavelets says nothing, and one without light adds nothing.
     order = torch.randperm(30)
