@@ -3,8 +3,10 @@
 # mypy: disable-error-code="no-untyped-def, misc"
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -60,6 +62,10 @@ def indirect(scene: Scene, grid, volume, camera, preliminary, width: int, height
     glossy = dr.select(hits.glossy, glossy * seen * (EVEN * dr.inv_pi / GLOSSY_CELLS * per_area), 0)
     dr.eval(diffuse, glossy)
     return diffuse, glossy
+
+
+GRID, PASSING = "grid.json", "passing.npy"
+"""Names in a bake: where the cells are, and what comes through between them."""
 
 
 class PropagatedLight:
@@ -130,13 +136,14 @@ class PropagatedLight:
 
 def _made(scene: Scene, cells: int, folder: Path) -> None:
     grid = Grid.around(*room_box(scene), cells)
-    shares = passing(grid, covered(scene, grid))
-    np.savez_compressed(
-        folder / "volume.npz", low=grid.low, side=grid.side, counts=grid.counts, passing=shares
-    )
+    np.save(folder / PASSING, passing(grid, covered(scene, grid)))
+    (folder / GRID).write_text(json.dumps(asdict(grid)), encoding="utf-8")
 
 
 def _read(folder: Path) -> tuple[Grid, Any]:
-    with np.load(folder / "volume.npz", allow_pickle=False) as found:
-        low, counts = (tuple(found[name].tolist()) for name in ("low", "counts"))
-        return Grid(low, float(found["side"]), counts), found["passing"].astype(np.float32)
+    found = json.loads((folder / GRID).read_text(encoding="utf-8"))
+    grid = Grid(tuple(found["low"]), float(found["side"]), tuple(found["counts"]))
+    shares = np.load(folder / PASSING, allow_pickle=False)
+    if shares.shape != (30, grid.size):
+        raise ValueError(f"{PASSING} is not of {grid.size} cells")
+    return grid, shares

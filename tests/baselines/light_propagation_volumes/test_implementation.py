@@ -211,3 +211,12 @@ def test_a_frame_without_an_area_light_is_refused(rig, method):
     rig.set(Lighting())
     with pytest.raises(MethodError, match="lpv is for frames under an area light"):
         method.render(View(Shot(CAMERA), None, RESOLUTION, 0, 0), Stages())
+
+
+@pytest.mark.parametrize("name", ["grid.json", "passing.npy"])
+def test_damaged_bakes_are_named(rig, tmp_path, name):
+    prepared(rig, tmp_path)
+    path = next((tmp_path / "bakes").glob(f"geometry-*/{name}"))
+    path.write_bytes(b"x" * path.stat().st_size)
+    with pytest.raises(MethodError, match=r"cannot be read .* remove that folder"):
+        prepared(rig, tmp_path)
