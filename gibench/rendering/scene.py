@@ -76,15 +76,15 @@ class Scene:
     def portals(self) -> Any:
         """`portals.Portals` of the openings; None where none are known, or under the scalar variant.
 
-        Under plain sampling and a light that stays, they have the share of the samples that pays in this room
-        (`portal_share`), and are None where that is none. A guide knows better, place by place.
+        Under a light that stays they have the share of the samples that pays in this room (`portal_share`), and are
+        None where that is none.
         """
         if self.openings is None or is_scalar():
             return None
         from gibench.rendering.portals import Portals
 
         portals = Portals(self.mi_scene, self.openings)
-        if self.sampling != PLAIN or self.lights is not None:
+        if self.lights is not None:
             return portals
         if not portals.lead_outside:
             return None

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gibench.rendering.portal_share import DARK, SHARES, portal_share, relative_noise
-from gibench.rendering.scene import GUIDED, load_dict
+from gibench.rendering.scene import load_dict
 from tests.rendering import test_portals
 from tests.rendering.scenes import rgb
 
@@ -42,7 +42,6 @@ def test_no_light_from_outside_is_no_use_of_portals(black):
         return
     scene = replace(load_dict(test_portals.room(environment=False)), openings=test_portals.OPENINGS_OF_ROOM)
     assert scene.portals is None
-    assert replace(scene, sampling=GUIDED).portals.fraction[0] == 0
 
 
 def test_it_is_the_same_whatever_the_threads():

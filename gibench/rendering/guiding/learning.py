@@ -27,8 +27,8 @@ from gibench.rendering.sampling import IndependentSampler
 SEED = 0
 """A guide is part of the scene to all frames, workers and methods."""
 
-LANES = 1 << 18
-"""Paths at a time."""
+LANES = 1 << 17
+"""Paths at a time. Twice as many learn no better guide: the variance was 1.08 and 1.09 times that in two rooms."""
 
 PASSES = (1, 2, 4)
 """Paths of a pass, as a multiple of LANES."""
@@ -248,7 +248,10 @@ def learn(scene: Any) -> Guide | None:
         fraction = float(portals.fraction[0])
         plain = np.append((1 - fraction) * plain, fraction)
     grid = Grid(points.min(axis=0) - MARGIN, points.max(axis=0) + MARGIN)
-    nothing = Distributions(np.zeros(grid.places, np.uint32), plain[None], np.ones((1, BINS)), np.zeros(1))
+    # Two rows: arrays with one entry would make another kernel.
+    nothing = Distributions(
+        np.zeros(grid.places, np.uint32), np.tile(plain, (2, 1)), np.ones((2, BINS)), np.zeros(2)
+    )
     guide = Guide(scene.mi_scene, portals, grid, nothing)
     starts = mi.Float(points.astype(np.float32).ravel())
     dr.make_opaque(starts)
