@@ -331,7 +331,7 @@ def test_ctrl_c_stops_tidily_and_says_how_to_continue(undisturbed, tmp_path):
 
 @pytest.mark.parametrize("times", [1, 2])
 def test_a_worker_that_hangs_is_given_up(undisturbed, tmp_path, monkeypatch, times):
-    monkeypatch.setattr(pool, "PATIENCE", 1.5)
+    monkeypatch.setattr(pool, "PATIENCE", 4.0)
     monkeypatch.setattr(pool, "LOOK_SECONDS", 0.2)
     root, recipe = tmp_path / "d", tiny(4)
     work = pool.Work(
@@ -356,7 +356,7 @@ def test_a_worker_that_hangs_is_given_up(undisturbed, tmp_path, monkeypatch, tim
 
 
 def test_a_worker_that_hangs_before_its_first_room_is_replaced_once(monkeypatch):
-    monkeypatch.setattr(pool, "PATIENCE", 1.5)
+    monkeypatch.setattr(pool, "PATIENCE", 4.0)
     monkeypatch.setattr(pool, "LOOK_SECONDS", 0.2)
     told = []
     listener = pool.Listener(
