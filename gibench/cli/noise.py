@@ -9,11 +9,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gibench.cli.dataset import check_variant, resolution_of
+from gibench.cli.dataset import (
+    AllowMissing,
+    AllowOutside,
+    Parameters,
+    Scale,
+    UpAxis,
+    check_variant,
+    resolution_of,
+)
 from gibench.cli.output import one_line, say
 
 if TYPE_CHECKING:
-    from gibench.rendering.noise.splitting import FrameNoise, LoudPath, Split
+    from gibench.rendering.noise.splitting import FrameNoise, Split, WorstPath
 
 NAME = 46
 """Columns of the names of terms."""
@@ -36,7 +44,12 @@ def noise(
     sampling: Annotated[
         str | None, typer.Option(help="plain or guided.", show_default="the dataset's, or plain")
     ] = None,
-    paths: Annotated[int, typer.Option(min=0, max=1000, help="How many of the loudest paths to name.")] = 5,
+    paths: Annotated[int, typer.Option(min=0, max=1000, help="How many of the worst paths to name.")] = 5,
+    up: UpAxis = None,
+    scale: Scale = None,
+    allow_missing: AllowMissing = False,
+    allow_outside: AllowOutside = False,
+    define: Parameters = None,
     variant: Annotated[str, typer.Option(help="Mitsuba's, or auto: the fastest that works.")] = "auto",
     as_json: Annotated[bool, typer.Option("--json", help="For programs.")] = False,
 ) -> None:
@@ -46,6 +59,7 @@ def noise(
     from gibench.cli.progress import counting
     from gibench.datasets.errors import RecipeError
     from gibench.datasets.room_view import open_view
+    from gibench.generators.imported.scene import ImportSettings
     from gibench.rendering.backend import select_variant
     from gibench.rendering.noise.splitting import split_noise
     from gibench.rendering.render import MAX_DEPTH
@@ -54,7 +68,14 @@ def noise(
     if sampling not in (None, *SAMPLINGS):
         raise RecipeError(f"--sampling: there is no sampling '{sampling}'; allowed: {' or '.join(SAMPLINGS)}")
     select_variant(variant)
-    found = open_view(scene, view, sampling)
+    settings = ImportSettings(
+        up or "auto",
+        1.0 if scale is None else scale,
+        allow_missing,
+        allow_outside,
+        parameters=tuple(define or ()),
+    )
+    found = open_view(scene, view, sampling, settings)
     with counting("pixels") as on_pixels:
         split = split_noise(
             found.scene,
@@ -89,7 +110,7 @@ def _print(title: str, noise: FrameNoise) -> None:
         _print_split(axis, split, noise.variance)
     if noise.paths:
         say("")
-        say("the loudest paths, one a pixel at most:")
+        say("the worst paths, one a pixel at most:")
     for path in noise.paths:
         _print_path(path)
 
@@ -113,7 +134,7 @@ def _row(name: str, variance: float, light: float | None) -> None:
     say(f"  {_short(name, NAME - 3):<{NAME - 2}}{f'{variance:.1%}':>14}{shown:>14}".rstrip())
 
 
-def _print_path(path: LoudPath) -> None:
+def _print_path(path: WorstPath) -> None:
     column, row = path.pixel
     say(
         f"  pixel ({column}, {row}), depth {path.depth}: {path.contribution:.3g} x the mean there; the pixel holds "

@@ -13,6 +13,7 @@ from gibench.datasets.errors import DatasetError
 from gibench.datasets.folder import MANIFEST, room_folder
 
 if TYPE_CHECKING:
+    from gibench.generators.imported.scene import ImportSettings
     from gibench.rendering.camera import PinholeCamera
     from gibench.rendering.scene import Scene
 
@@ -46,11 +47,14 @@ def check_scene_file(root: Path, folder: Path) -> None:
         raise gate.GateError(str(problem)) from None
 
 
-def open_view(place: Path, view: int, sampling: str | None) -> RoomView:
+def open_view(
+    place: Path, view: int, sampling: str | None, settings: ImportSettings | None = None
+) -> RoomView:
     """One view of a scene file, of a folder with one, or of a room folder of a dataset.
 
     view: number of the frame of the room, or of the camera of the file. sampling: one of `scene.SAMPLINGS`; None for
-    that of the dataset, or plain. Raises DatasetError, SceneFileError or SceneError.
+    that of the dataset, or plain. settings: how a scene file is read. Raises DatasetError, SceneFileError or
+    SceneError.
     """
     if not place.exists():
         raise DatasetError(f"there is no {place}: name a scene file, or a room such as DIR/rooms/000000")
@@ -62,7 +66,7 @@ def open_view(place: Path, view: int, sampling: str | None) -> RoomView:
         raise DatasetError(f"{place} holds no {SCENE}: name a scene file, or a room such as DIR/rooms/000000")
     if place.is_dir() and (place.resolve().parents[1] / MANIFEST).is_file():
         return _view_of_room(place.resolve(), view, sampling)
-    return _view_of_file(place / SCENE if place.is_dir() else place, view, sampling or "plain")
+    return _view_of_file(place / SCENE if place.is_dir() else place, view, sampling or "plain", settings)
 
 
 def _view_of_room(folder: Path, view: int, sampling: str | None) -> RoomView:
@@ -92,12 +96,12 @@ def _view_of_room(folder: Path, view: int, sampling: str | None) -> RoomView:
     return RoomView(scene, shot.camera, f"room {found.room} of {root.name}, view {view}", recipe.max_depth)
 
 
-def _view_of_file(file: Path, view: int, sampling: str) -> RoomView:
+def _view_of_file(file: Path, view: int, sampling: str, settings: ImportSettings | None) -> RoomView:
     from gibench.generators.imported.room import import_room, write_imported_room
     from gibench.generators.imported.scene import import_scene
     from gibench.rendering.scene import load_scene
 
-    read = import_scene(file)
+    read = import_scene(file, settings)
     room = import_room(read, resolution=read.resolution, views=0 if read.cameras else 1)
     if not 0 <= view < len(room.cameras):
         last = len(room.cameras) - 1

@@ -42,6 +42,16 @@ def test_help_loads_nothing_heavy():
     assert "--paths" in done.stdout
 
 
+def test_a_scene_is_read_as_other_commands_read_it(scene, capsys):
+    text = scene.read_text()
+    lost = '<shape type="ply"><string name="filename" value="lost.ply"/><ref id="grey"/></shape></scene>'
+    scene.write_text(text.replace("</scene>", lost))
+    words = ["noise", str(scene), "--resolution", "8x8", "--spp", "4"]
+    assert run(app, words) == 2
+    assert "--allow-missing" in capsys.readouterr().err
+    assert run(app, [*words, "--allow-missing"]) == 0
+
+
 def test_a_scene_is_split_in_eighty_columns_and_for_programs(scene, capsys):
     words = ["noise", str(scene), "--resolution", "12x8", "--spp", "16"]
     assert run(app, words) == 0
@@ -54,7 +64,7 @@ def test_a_scene_is_split_in_eighty_columns_and_for_programs(scene, capsys):
         "by technique",
         "covariances",
         "light sampling",
-        "loudest paths",
+        "worst paths",
     ):
         assert part in said
     assert run(app, [*words, "--json"]) == 0

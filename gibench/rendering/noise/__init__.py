@@ -1,1 +1,1 @@
-"""Where the noise of a frame is: its variance by depth, lobe, light and technique, and the loudest paths."""
+"""Where the noise of a frame is: its variance by depth, lobe, light and technique, and the worst paths."""

@@ -71,7 +71,7 @@ class Vertex:
 
 
 @dataclass(frozen=True)
-class LoudPath:
+class WorstPath:
     """A path that brings much more than its pixel has on average.
 
     pixel: column and row. contribution: all that it brings, over the mean around the pixel. pixel_share: of the frame's
@@ -94,7 +94,7 @@ class FrameNoise:
 
     variance: relative, mean over pixels and components of variance / (mean² + DARK · squared mean of the frame), the
     mean over AROUND × AROUND pixels; all other variances are parts of it. noisiest: share of it in the noisiest
-    NOISIEST of the pixels. splits: "depth", "lobe", "light", "technique". paths: the loudest, one a pixel at most. spp,
+    NOISIEST of the pixels. splits: "depth", "lobe", "light", "technique". paths: the worst, one a pixel at most. spp,
     groups: samples a pixel and independent groups of them. invalid_paths: with NaN or infinity, which count as 0.
     """
 
@@ -105,7 +105,7 @@ class FrameNoise:
     variance: float
     noisiest: float
     splits: dict[str, Split]
-    paths: tuple[LoudPath, ...]
+    paths: tuple[WorstPath, ...]
     invalid_paths: int
 
 
@@ -149,10 +149,8 @@ class _Sums:
         self.sizes = {"all": 1, **{axis: len(terms) for axis, terms in names.items()}}
         self.means = {axis: np.zeros((pixels, n, 3), np.float32) for axis, n in self.sizes.items()}
         self.variances = {axis: np.zeros((pixels, n, 3), np.float32) for axis, n in self.sizes.items()}
-        self.loudest = np.zeros(pixels)
-        self.loudest_at = np.zeros(
-            (pixels, 2), np.int64
-        )  # samples before its launch, and its own number there
+        self.worst = np.zeros(pixels)
+        self.worst_at = np.zeros((pixels, 2), np.int64)  # samples before its launch, and its own number there
 
     def add(self, where: slice, groups: dict[str, list[NDArray[np.float64]]]) -> None:
         """groups: by axis, (pixels, groups, terms, 3) means of each launch."""
@@ -177,7 +175,7 @@ def split_noise(
 ) -> FrameNoise:
     """Traces a frame and says where its noise is.
 
-    resolution: (width, height). spp: samples a pixel, at least 2. paths: how many of the loudest to name. on_pixels:
+    resolution: (width, height). spp: samples a pixel, at least 2. paths: how many of the worst to name. on_pixels:
     told how many pixels are done, and of how many.
 
     Raises CameraError, or EstimateError for numbers out of range, for a frame too large to be taken apart, and under
@@ -237,11 +235,11 @@ def _block(frame: _Frame, sums: _Sums, first: int, pixels: int) -> int:
         groups["lobe"].append(lobes.reshape(pixels, -1, 2, 3) / in_group)
         brought = _binned(found.lane, value, pixels * samples).mean(axis=1).reshape(pixels, samples)
         best = brought.argmax(axis=1)
-        loudest = brought[np.arange(pixels), best]
-        louder = loudest > sums.loudest[where]
-        sums.loudest[where] = np.where(louder, loudest, sums.loudest[where])
+        worst = brought[np.arange(pixels), best]
+        worse = worst > sums.worst[where]
+        sums.worst[where] = np.where(worse, worst, sums.worst[where])
         at = np.stack([np.full(pixels, done), best], axis=1)
-        sums.loudest_at[where] = np.where(louder[:, None], at, sums.loudest_at[where])
+        sums.worst_at[where] = np.where(worse[:, None], at, sums.worst_at[where])
     sums.add(where, groups)
     return invalid
 
@@ -279,10 +277,10 @@ def _told(
         rows = tuple(Term(*row) for row in zip(terms, parts, light, strict=True))
         splits[axis] = Split(rows, variance - sum(parts))
     gray = around.mean(axis=1)
-    loudness = sums.loudest / np.maximum(np.sqrt(np.square(gray) + DARK * gray.mean() ** 2), 1e-30)
-    order = np.argsort(-loudness, kind="stable")[: max(paths, 0)]
+    excess = sums.worst / np.maximum(np.sqrt(np.square(gray) + DARK * gray.mean() ** 2), 1e-30)
+    order = np.argsort(-excess, kind="stable")[: max(paths, 0)]
     share = by_pixel / (by_pixel.sum() or 1.0)
-    chosen = [int(pixel) for pixel in order if sums.loudest[pixel] > 0]
+    chosen = [int(pixel) for pixel in order if sums.worst[pixel] > 0]
     return FrameNoise(
         resolution=frame.resolution,
         spp=frame.spp,
@@ -304,19 +302,19 @@ def _traced_again(
     chosen: list[int],
     gray: NDArray[np.float64],
     share: NDArray[np.float64],
-) -> tuple[LoudPath, ...]:
-    """The loudest paths of some pixels, in this order. Their launches are repeated, which keeps memory small."""
+) -> tuple[WorstPath, ...]:
+    """The worst paths of some pixels, in this order. Their launches are repeated, which keeps memory small."""
     launches: dict[tuple[int, int], list[int]] = {}
     for pixel in chosen:
-        launches.setdefault((pixel // at_once * at_once, int(sums.loudest_at[pixel, 0])), []).append(pixel)
+        launches.setdefault((pixel // at_once * at_once, int(sums.worst_at[pixel, 0])), []).append(pixel)
     width, height = frame.resolution
-    found: dict[int, LoudPath] = {}
+    found: dict[int, WorstPath] = {}
     samples_of = dict(frame.rounds())
     for (first, done), pixels in launches.items():
         samples = samples_of[done]
         traced = frame.contributions(first, min(at_once, width * height - first), done, samples)
         for pixel in pixels:
-            lane = (pixel - first) * samples + int(sums.loudest_at[pixel, 1])
+            lane = (pixel - first) * samples + int(sums.worst_at[pixel, 1])
             own = np.flatnonzero(traced.lane == lane)
             brightest = own[traced.value[own].sum(axis=(1, 2)).argmax()]
             depth = int(traced.depth[brightest])
@@ -328,9 +326,9 @@ def _traced_again(
                 )
                 for k in range(depth)
             )
-            found[pixel] = LoudPath(
+            found[pixel] = WorstPath(
                 pixel=(pixel % width, pixel // width),
-                contribution=float(sums.loudest[pixel] / gray[pixel]),
+                contribution=float(sums.worst[pixel] / gray[pixel]),
                 pixel_share=float(share[pixel]),
                 depth=depth,
                 light=names["light"][int(traced.light[brightest])],

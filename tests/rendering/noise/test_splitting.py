@@ -152,7 +152,7 @@ def test_the_lamp_that_makes_the_noise_is_blamed():
     assert terms["lamp"].light * np.mean(noise.mean) == pytest.approx(alone, rel=0.03)
 
 
-def test_the_loudest_paths_lie_where_they_say():
+def test_the_worst_paths_lie_where_they_say():
     scene = load_dict(scenes.box("coat"))
     noise = split_noise(scene, scenes.CAMERA, resolution=(24, 16), spp=64, max_depth=5, paths=40)
     assert len(noise.paths) == 40
