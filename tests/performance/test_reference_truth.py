@@ -2,6 +2,8 @@
 
 Two renderings of many more samples stand for the truth and share nothing with the references: errors against it have no
 bias (`gibench.metrics.unbiased`), whoever computes them. Rooms of the preset `cpu`, and scene files that are at hand.
+The figures of docs/benchmark.md are with GIBENCH_TRUTH_ROOMS=0,1,2,3,4, GIBENCH_TRUTH_RESOLUTION=128,72 and
+GIBENCH_TRUTH_SPP=2048.
 """
 
 from __future__ import annotations
