@@ -114,11 +114,16 @@ def dry_run(recipe: Recipe, variant: str, workers: int) -> None:
     else:
         say(_row("rooms", f"{result.rooms} built and checked, {built}"))
     _print_rejections(result.rejections, result.rejected_rooms)
-    say(_row("frames", f"{result.frames}, about {result.seconds_per_frame:.2g} s each"))
+    say(_row("frames", f"{result.frames}, about {two_digits(result.seconds_per_frame)} s each"))
     speed = amount(result.paths_per_second, "paths/s")
     say(_row("time", f"{most}{duration(result.seconds)} ({result.variant}, {speed})"))
     say(_row("disk", f"about {amount(result.bytes, 'B')}"))
     say("Time and disk are scaled from one small frame of a first room; nothing was kept.")
+
+
+def two_digits(value: float) -> str:
+    """A number of two significant digits without an exponent: 0.012, 1.2, 120."""
+    return f"{float(f'{value:.2g}'):g}"
 
 
 def _gloss(root: Path) -> str:
