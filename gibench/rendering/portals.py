@@ -97,23 +97,25 @@ class Portals:
             after = self._end(portal)
         return portal, dr.clip((u - before) / dr.maximum(after - before, 1e-20), 0, 1)
 
+    def _entry(self, u):
+        """A portal and a point on it."""
+        portal, along = self._chosen(u.x)
+        return portal, self._row(portal, 0) + along * self._row(portal, 3) + u.y * self._row(portal, 6)
+
     def sample(self, point, u):
         """Directions from points through the portals: unit mi.Vector3f, zero where the point lies behind its portal.
 
         u: mi.Point2f in [0, 1)², of which the first also chooses the portal.
         """
-        portal, along = self._chosen(u.x)
-        target = self._row(portal, 0) + along * self._row(portal, 3) + u.y * self._row(portal, 6)
+        portal, target = self._entry(u)
         direction = dr.normalize(target - point)
         in_front = dr.dot(direction, self._row(portal, 9)) < 0
         return dr.select(in_front & dr.all(dr.isfinite(direction)), direction, 0)
 
     def entrance(self, u):
-        """Points on the portals and their normals, which point inside. u: as for `sample`."""
-        portal, along = self._chosen(u.x)
-        return self._row(portal, 9), self._row(portal, 0) + along * self._row(portal, 3) + u.y * self._row(
-            portal, 6
-        )
+        """Normals of the portals, which point inside, and points on them. u: as for `sample`."""
+        portal, target = self._entry(u)
+        return self._row(portal, 9), target
 
     @dr.syntax
     def density(self, point, direction):

@@ -89,7 +89,7 @@ class RepresentedLight:
             weights, facts = artifacts.kept(bake.folder)
             network = Represented(plan.size)
             network.load_state_dict(weights["network"])
-            self.measure = Measure.of_facts({name: float(value) for name, value in facts.items()})
+            self.measure = Measure.of_facts(facts)
         self.use(network)
 
     def observe(self, site: Site, cameras: Sequence[PinholeCamera], measure: Measure) -> None:

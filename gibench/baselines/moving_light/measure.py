@@ -6,9 +6,10 @@ that a brighter or a redder light is the same light to a network.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import torch
 from torch import Tensor
@@ -56,7 +57,7 @@ class Measure:
         return ((points - centre) / half).clamp(-FARTHEST, FARTHEST)
 
     @staticmethod
-    def of_facts(facts: dict[str, float]) -> Measure:
+    def of_facts(facts: Mapping[str, Any]) -> Measure:
         """The inverse. Raises KeyError, ValueError, TypeError."""
         centre, half = (tuple(float(facts[f"{name}_{k}"]) for k in range(3)) for name in ("centre", "half"))
         return Measure(centre, half, float(facts["direct"]), float(facts["indirect"]))  # type: ignore[arg-type]

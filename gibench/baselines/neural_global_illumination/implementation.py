@@ -18,7 +18,6 @@ from gibench.baselines.neural_global_illumination.training import (
     Examples,
     Predicting,
     TrainingPlan,
-    facts_of,
     size_of,
 )
 from gibench.baselines.sources import digest
@@ -70,7 +69,7 @@ class NeuralLight:
         with reading("the trained network", site.weights):
             weights, facts = artifacts.kept(site.weights)
             self.network.load_state_dict(weights["network"])
-            self.measure: Measure = facts_of(facts)
+            self.measure = Measure.of_facts(facts)
         self.network.eval().requires_grad_(False).to(torch_device())
         self._frames = LitFrames(site.scene, SURFACE, cues=self._lighting == "all")
 

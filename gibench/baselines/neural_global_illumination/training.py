@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -164,8 +164,3 @@ class Predicting(Learner):
         """Whether this step has LPIPS in its loss."""
         due = now.progress >= PERCEPTUAL_FROM and now.number % PERCEPTUAL_EVERY == 0
         return self.lpips is not None and due and min(code.shape[-2:]) >= SMALLEST
-
-
-def facts_of(kept: Mapping[str, Any]) -> Measure:
-    """The measure that is kept with weights. Raises KeyError, ValueError, TypeError."""
-    return Measure.of_facts({name: float(value) for name, value in kept.items()})

@@ -74,7 +74,7 @@ class RegressedLight:
             partition = Partition(**weights["partition"])
             self.networks = CellNetworks(partition.cells)
             self.networks.load_state_dict(weights["cells"])
-            self.measure = Measure.of_facts({name: float(value) for name, value in facts.items()})
+            self.measure = Measure.of_facts(facts)
         self.networks.eval().requires_grad_(False).to(torch_device())
         self.partition = partition.to(torch_device())
         self._frames = LitFrames(site.scene, SURFACE)

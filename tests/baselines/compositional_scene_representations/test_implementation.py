@@ -17,17 +17,16 @@ from gibench.baselines.compositional_scene_representations.network import (
     Represented,
 )
 from gibench.baselines.compositional_scene_representations.observations import observers, pose
-from gibench.baselines.method import MethodError, View
+from gibench.baselines.method import MethodError
 from gibench.baselines.moving_light.measure import Measure
-from gibench.baselines.stages import Stages
 from gibench.rendering.camera import PinholeCamera
-from gibench.rendering.lighting import AreaLight, Lighting, Shot
+from gibench.rendering.lighting import Lighting
 from gibench.rendering.render import render_frame
+from tests.baselines.area_lights import HARD_LIGHTS, LIGHT, lit_frame
 from tests.baselines.material_strips import CAMERA, strips_rig
 from tests.baselines.sites import site
 
 RESOLUTION = (32, 24)
-LIGHT = AreaLight((0.0, 0.0, 1.8), (0, 0.1, -1), 0.6, 0.6, (5, 4, 3))
 MEASURE = Measure((0.0, 0.0, 1.0), (2.0, 2.0, 1.0), 0.1, 0.05)
 CAMERAS = [dataclasses.replace(CAMERA, position=(0.5 * k, -2.4, 1.2)) for k in range(OBSERVATIONS)]
 
@@ -55,15 +54,7 @@ def method(rig, tmp_path_factory):
 
 
 def frame(rig, method, light, resolution=RESOLUTION, camera=CAMERA):
-    rig.set(Lighting(area=light))
-    stages = Stages()
-    found = method.render(View(Shot(camera, Lighting(area=light)), None, resolution, 0, 0), stages)
-    assert {"g-buffer", "shadow rays", "filtering", "observations", "inference"} == set(stages.seconds)
-    for image in (found.color, found.indirect):
-        assert image.shape == (resolution[1], resolution[0], 3)
-        assert np.isfinite(image).all()
-        assert (image >= 0).all()
-    return found
+    return lit_frame(rig, method, light, resolution, ("observations", "inference"), camera)
 
 
 def test_observations_are_the_light_of_the_room(rig, method):
@@ -90,15 +81,7 @@ def test_observers_are_far_apart():
     assert observers(near[:1], MEASURE) == [near[0]] * OBSERVATIONS  # as many as there are
 
 
-@pytest.mark.parametrize(
-    "light",
-    [
-        AreaLight((0.0, 1.5, 1.0), (0, -1, 0), 0.6, 0.6, (5, 4, 3)),  # in a wall
-        AreaLight((0.0, 0.0, -0.5), (0, 0, -1), 0.6, 0.6, (5, 4, 3)),  # seen by no surface
-        AreaLight((0.0, -1.8, 1.0), (0, -1, 0), 3.0, 3.0, (5, 4, 3)),  # fills the view
-        AreaLight((0.0, 0.0, 1.8), (0, 0, -1), 0.01, 0.01, (5, 4, 3)),
-    ],
-)
+@pytest.mark.parametrize("light", HARD_LIGHTS)
 def test_hard_lights_give_finite_light(rig, method, light):
     frame(rig, method, light)
 

@@ -21,13 +21,13 @@ from gibench.rendering.light_rig import LightRig
 from gibench.rendering.lighting import AreaLight, Lighting, Shot
 from gibench.rendering.render import render_frame
 from gibench.rendering.scene import load_dict
+from tests.baselines.area_lights import HARD_LIGHTS, LIGHT, lit_frame
 from tests.baselines.material_strips import CAMERA, strips_rig
 from tests.baselines.sites import site
 from tests.rendering import scenes
 from tests.rendering.test_kernels import kernels_of
 
 RESOLUTION = (24, 20)
-LIGHT = AreaLight((0.0, 0.0, 1.8), (0, 0.1, -1), 0.6, 0.6, (5, 4, 3))
 SETTINGS = {"cells": 8, "steps": 32, "virtual_lights": 16384, "rays": 1}
 
 
@@ -48,17 +48,7 @@ def method(rig, tmp_path_factory):
 
 
 def frame(rig, method, light, resolution=RESOLUTION, camera=CAMERA):
-    rig.set(Lighting(area=light))
-    stages = Stages()
-    found = method.render(View(Shot(camera, Lighting(area=light)), None, resolution, 0, 0), stages)
-    assert {"virtual lights", "propagation", "gather", "g-buffer", "shadow rays", "filtering"} == set(
-        stages.seconds
-    )
-    for image in (found.color, found.indirect):
-        assert image.shape == (resolution[1], resolution[0], 3)
-        assert np.isfinite(image).all()
-        assert (image >= 0).all()
-    return found
+    return lit_frame(rig, method, light, resolution, ("virtual lights", "propagation", "gather"), camera)
 
 
 WHITE = 0.6
@@ -163,15 +153,7 @@ def test_black_light_is_black(rig, method):
     assert not red.color[..., 1:].any()
 
 
-@pytest.mark.parametrize(
-    "light",
-    [
-        AreaLight((0.0, 1.5, 1.0), (0, -1, 0), 0.6, 0.6, (5, 4, 3)),  # in a wall
-        AreaLight((0.0, 0.0, -0.5), (0, 0, -1), 0.6, 0.6, (5, 4, 3)),  # seen by no surface
-        AreaLight((0.0, -1.8, 1.0), (0, -1, 0), 3.0, 3.0, (5, 4, 3)),  # fills the view
-        AreaLight((0.0, 0.0, 1.8), (0, 0, -1), 0.01, 0.01, (5, 4, 3)),
-    ],
-)
+@pytest.mark.parametrize("light", HARD_LIGHTS)
 def test_hard_lights_give_finite_light(rig, method, light):
     frame(rig, method, light)
 

@@ -8,22 +8,19 @@ import numpy as np
 import pytest
 import torch
 
-from gibench.baselines.method import MethodError, View
+from gibench.baselines.method import MethodError
 from gibench.baselines.moving_light.measure import Measure
 from gibench.baselines.neural_global_illumination import METHOD
 from gibench.baselines.neural_global_illumination.implementation import NeuralLight
 from gibench.baselines.neural_global_illumination.network import SMALL, NeuralGlobalIllumination
-from gibench.baselines.stages import Stages
 from gibench.baselines.training.artifacts import RECORD, WEIGHTS
 from gibench.baselines.training.files import write_tensors
 from gibench.rendering.camera import PinholeCamera
-from gibench.rendering.lighting import AreaLight, Lighting, Shot
+from tests.baselines.area_lights import HARD_LIGHTS, LIGHT, lit_frame
 from tests.baselines.material_strips import CAMERA, strips_rig
 from tests.baselines.sites import site
 
 RESOLUTION = (40, 32)
-
-LIGHT = AreaLight((0.0, 0.0, 1.8), (0, 0.1, -1), 0.6, 0.6, (5, 4, 3))
 
 
 @pytest.fixture(scope="module")
@@ -58,26 +55,10 @@ def method(rig, weights, tmp_path_factory):
 
 
 def frame(rig, method, light, resolution=RESOLUTION, camera=CAMERA):
-    rig.set(Lighting(area=light))
-    stages = Stages()
-    found = method.render(View(Shot(camera, Lighting(area=light)), None, resolution, 0, 0), stages)
-    assert {"g-buffer", "shadow rays", "filtering", "inference"} == set(stages.seconds)
-    for image in (found.color, found.indirect):
-        assert image.shape == (resolution[1], resolution[0], 3)
-        assert np.isfinite(image).all()
-        assert (image >= 0).all()
-    return found
+    return lit_frame(rig, method, light, resolution, ("inference",), camera)
 
 
-@pytest.mark.parametrize(
-    "light",
-    [
-        AreaLight((0.0, 1.5, 1.0), (0, -1, 0), 0.6, 0.6, (5, 4, 3)),  # in a wall
-        AreaLight((0.0, 0.0, -0.5), (0, 0, -1), 0.6, 0.6, (5, 4, 3)),  # seen by no surface
-        AreaLight((0.0, -1.8, 1.0), (0, -1, 0), 3.0, 3.0, (5, 4, 3)),  # fills the view
-        AreaLight((0.0, 0.0, 1.8), (0, 0, -1), 0.01, 0.01, (5, 4, 3)),
-    ],
-)
+@pytest.mark.parametrize("light", HARD_LIGHTS)
 def test_hard_lights_give_finite_light(rig, method, light):
     frame(rig, method, light)
 
