@@ -71,7 +71,7 @@ def describe(root: Path, manifest: dict[str, Any]) -> None:
     say(_row("channels", f"{len(recipe['channels'])}, {denoised}"))
     if totals is not None:
         if totals["median_error"] is not None:
-            say(_row("median error", f"{100 * totals['median_error']:.2g} % (of the samples)"))
+            say(_row("median error", f"{two_digits(100 * totals['median_error'])} % (of the samples)"))
         say(_row("size", f"{amount(totals['bytes'], 'B')} ({amount(totals['frame_bytes'], 'B')} in frames)"))
         if totals["kernel_seconds"] > 0:
             speed = amount(totals["paths"] / totals["kernel_seconds"], "paths/s")
