@@ -197,6 +197,18 @@ class Track(_Strict):
             raise TrackError(f"track {self.id} has no preset '{name}'; {nearest(name, self.presets)}")
         return self.presets[name]
 
+    def with_training_seconds(self, name: str, seconds: float) -> Track:
+        """The same track, but each training of a preset ends after so many seconds. Raises TrackError."""
+        preset = self.preset(name)
+        if preset.training is None:
+            raise TrackError(
+                f"preset {name} of track {self.id} has nothing to train on: it takes no training seconds"
+            )
+        budget = preset.budget.model_copy(update={"training": seconds})
+        preset = preset.model_copy(update={"budget": budget})
+        _check_training(self, preset, f"track {self.id}, preset {name}")
+        return self.model_copy(update={"presets": {**self.presets, name: preset}})
+
 
 def track_names() -> tuple[str, ...]:
     """Ids of the tracks that ship with gibench."""

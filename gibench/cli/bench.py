@@ -53,6 +53,10 @@ def run_track(
     seeds: Annotated[
         str | None, typer.Option(help="Such as 0,1,2, for trained methods.", show_default="the preset's")
     ] = None,
+    training_seconds: Annotated[
+        float | None,
+        typer.Option(help="Seconds after which a training ends.", show_default="the preset's"),
+    ] = None,
     variant: Annotated[str, typer.Option(help="Mitsuba's, or auto: the fastest that works.")] = "auto",
     cluster: Annotated[
         str | None,
@@ -78,9 +82,15 @@ def run_track(
     chosen = load_track(track)
     chosen.preset(preset)
     check_variant(variant)
-    for option, value in (("--rooms", rooms), ("--equal-time", equal_time)):
+    for option, value in (
+        ("--rooms", rooms),
+        ("--equal-time", equal_time),
+        ("--training-seconds", training_seconds),
+    ):
         if value is not None and not value > 0:
             raise TrackError(f"{option}: {value:g} is not allowed; allowed is a number above 0")
+    if training_seconds is not None:
+        chosen = chosen.with_training_seconds(preset, training_seconds)
     if scene and rooms is not None:
         raise TrackError("--scene takes the place of rooms: leave out --rooms")
     scenes = {
@@ -100,6 +110,7 @@ def run_track(
         "--rooms": rooms,
         "--equal-time": equal_time,
         "--seeds": seeds,
+        "--training-seconds": None if training_seconds is None else f"{training_seconds:g}",
         "--variant": None if variant == "auto" else variant,
         "--cluster": cluster,
     }

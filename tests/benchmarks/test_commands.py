@@ -74,6 +74,8 @@ def refused(capsys, *arguments, code: int = 2) -> str:
         (["--methods", "plain", "--set", "shade"], r"--set: 'shade' is no setting"),
         (["--methods", "plain", "--rooms", "0"], r"--rooms: 0 is not allowed"),
         (["--methods", "plain", "--equal-time", "nan"], r"--equal-time: nan is not allowed"),
+        (["--methods", "plain", "--training-seconds", "0"], r"--training-seconds: 0 is not allowed"),
+        (["--methods", "plain", "--training-seconds", "inf"], r"training \(inf s\) must be below prepare"),
         (["--methods", "plain", "--seeds", "1,x"], r"--seeds: '1,x' is not allowed"),
         (["--methods", "plain", "--seeds=-1"], r"--seeds: '-1' is not allowed"),
         (["--variant", "cuda"], r"--variant: no variant 'cuda'"),

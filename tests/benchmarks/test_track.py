@@ -192,6 +192,18 @@ def test_trainings_that_cannot_be_are_refused(track, preset, says):
         check_track(changed(change))
 
 
+def test_other_training_seconds():
+    track = check_track(changed(lambda t, p: p.update(budget={"training": 9, "prepare": 60, "render": 5})))
+    shorter = track.with_training_seconds("tiny", 3)
+    assert shorter.preset("tiny").budget.training == 3
+    assert track.preset("tiny").budget.training == 9
+    assert shorter.preset("tiny").recipe("training") == track.preset("tiny").recipe("training")
+    with pytest.raises(TrackError, match=r"training \(60 s\) must be below prepare \(60 s\)"):
+        track.with_training_seconds("tiny", 60)
+    with pytest.raises(TrackError, match="preset tiny of track walkthrough has nothing to train on"):
+        check_track(changed(lambda t, p: p.update(training=None))).with_training_seconds("tiny", 3)
+
+
 def test_rooms_to_train_on_are_others_than_those_that_are_scored():
     track = check_track(changed(lambda t, p: (t.update(ROOMS), p.update(OWN))))
     preset = track.preset("tiny")
