@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import importlib
 from functools import partial
 
 import pytest
 import torch
 
+from gibench.baselines.compositional_scene_representations import network as cnnr
+from gibench.baselines.compositional_scene_representations.network import Represented
 from gibench.baselines.efficient_light_probes.network import GUIDES, ReconstructionNetwork
-from gibench.baselines.geometry_aware_feature_aggregation.network import MINI, GeometryAware
+from gibench.baselines.image_to_image.shading import GEOMETRY, LIGHT
 from gibench.baselines.neural_global_illumination.network import SMALL, NeuralGlobalIllumination
 from gibench.baselines.training.budget import Budget
 from gibench.baselines.training.loop import train
@@ -44,12 +47,26 @@ def test_what_the_loop_adds_to_a_step():
     assert looped > 0
 
 
+def of_images(package):
+    """An image-to-image network at half of its channels, and what a step gives it."""
+    method = importlib.import_module(f"gibench.baselines.{package}").METHOD
+    module, name = method.implementation.split(":")
+    settings = {knob.name: knob.default for knob in method.knobs} | {"width": 0.5}
+    implementation = getattr(importlib.import_module(module), name)(settings)
+    return implementation.network(), (torch.rand(2, LIGHT, 3, 128, 128), torch.randn(2, GEOMETRY, 128, 128))
+
+
 NETWORKS = {
-    "ngi, small, 128²": lambda: (NeuralGlobalIllumination(SMALL), (torch.randn(1, 34, 128, 128),)),
-    "gfa:mini, 96 × 64": lambda: (
-        GeometryAware(MINI),
-        (torch.rand(1, 2, 3, 64, 96), torch.randn(1, 7, 64, 96)),
+    "ngi, small": lambda: (NeuralGlobalIllumination(SMALL), (torch.randn(2, 34, 64, 64),)),
+    "cnnr, small": lambda: (
+        Represented(cnnr.SMALL),
+        (torch.rand(2, cnnr.OBSERVATIONS, 3, cnnr.SIDE, cnnr.SIDE), torch.rand(2, cnnr.PIXEL, 64, 64)),
     ),
+    "gfa": lambda: of_images("geometry_aware_feature_aggregation"),
+    "deep-shading": lambda: of_images("deep_shading"),
+    "bcn": lambda: of_images("bilateral_network"),
+    "pix2pix": lambda: of_images("pix2pix"),
+    "resnet": lambda: of_images("resnet_generator"),
     "elp, 4 crops of 64²": lambda: (
         ReconstructionNetwork(),
         (torch.rand(4, 3, 64, 64), torch.rand(4, GUIDES, 64, 64)),
@@ -59,6 +76,7 @@ NETWORKS = {
 
 @pytest.mark.parametrize("name", NETWORKS)
 def test_whether_bfloat16_pays(name):
+    """On a processor without tiles it does not, and `precision.mixed` leaves it."""
     torch.manual_seed(0)
     network, given = NETWORKS[name]()
     optimiser = torch.optim.Adam(network.parameters(), 1e-4)

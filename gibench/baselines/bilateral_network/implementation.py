@@ -12,6 +12,8 @@ from gibench.baselines.image_to_image.implementation import IndirectByNetwork
 class BilateralConvolutions(IndirectByNetwork):
     """See `gibench.baselines.bilateral_network.METHOD`."""
 
+    mixed = False
+
     def network(self) -> nn.Module:
         """The network, untrained."""
         return BilateralNetwork(channels_at(float(self.settings["width"]), CHANNELS))

@@ -78,24 +78,25 @@ class Generator(nn.Module):
         super().__init__()
         given = PIXEL + size.represented
         befores = [given] + [given + size.width] * (LAYERS - 1)
-        self.layers = nn.ModuleList(nn.Conv2d(before, size.width, 1) for before in befores)
-        self.last = nn.Conv2d(size.width, 3, 1)
+        self.layers = nn.ModuleList(nn.Linear(before, size.width) for before in befores)
+        self.last = nn.Linear(size.width, 3)
         with torch.no_grad():
             self.last.weight *= CALM
 
     def begin_at(self, code: Tensor) -> None:
         """Begin with about the same code (3,) everywhere: the mean of what is to be learned."""
         with torch.no_grad():
-            self.last.bias.copy_(code)  # type: ignore[union-attr]
+            self.last.bias.copy_(code)
 
     def forward(self, pixels: Tensor, represented: Tensor) -> Tensor:
         """(N, PIXEL, H, W) and (N, represented) to (N, 3, H, W)."""
-        given = torch.cat([pixels, represented[:, :, None, None].expand(-1, -1, *pixels.shape[-2:])], dim=1)
-        x = given
+        pixels = pixels.movedim(1, -1)
+        everywhere = represented[:, None, None].expand(-1, *pixels.shape[1:3], -1)
+        x = given = torch.cat([pixels, everywhere], dim=-1)
         for number, layer in enumerate(self.layers):
-            x = leaky_relu(layer(x if number == 0 else torch.cat([x, given], dim=1)))
+            x = leaky_relu(layer(x if number == 0 else torch.cat([x, given], dim=-1)))
         found: Tensor = self.last(x)
-        return found
+        return found.movedim(-1, 1)
 
 
 class Represented(nn.Module):

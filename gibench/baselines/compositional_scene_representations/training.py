@@ -24,6 +24,7 @@ from gibench.baselines.training.learner import Learner, Step
 from gibench.baselines.training.loop import train
 from gibench.baselines.training.losses.pixels import absolute
 from gibench.baselines.training.losses.structural import dissimilarity
+from gibench.baselines.training.precision import mixed
 from gibench.baselines.training.reproducible import seeded
 from gibench.baselines.training.schedule import half_cosine, set_rate
 from gibench.rendering.camera import PinholeCamera
@@ -146,7 +147,8 @@ class Representing(Learner):
         """Down twice the absolute difference and 1 − SSIM."""
         set_rate(self.optimisers["network"], RATES[self.plan.network] * half_cosine(now.progress))
         light, pixels, truth = (part.to(self.device) for part in batch)
-        output = self.network(light, pixels)
+        with mixed(self.device):
+            output = self.network(light, pixels).float()
         losses = {"pixels": absolute(output, truth), "structure": dissimilarity(output, truth)}
         loss = ABSOLUTE * losses["pixels"] + losses["structure"]
         self.descend("network", loss, largest_gradient=LARGEST_GRADIENT)

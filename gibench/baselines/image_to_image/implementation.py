@@ -31,6 +31,9 @@ HELD_OUT, MOST_HELD_OUT = 0.05, 8
 class IndirectByNetwork(DirectLight):
     """A method with `KNOBS`. A subclass says what network it is, a module as `shading.indirect` takes it."""
 
+    mixed = True
+    """Whether steps of the network are faster in `precision.mixed`."""
+
     def __init__(self, settings: Mapping[str, Setting]) -> None:
         """settings: all knobs of the method."""
         super().__init__(settings)
@@ -53,7 +56,7 @@ class IndirectByNetwork(DirectLight):
         with seeded(plan.seed):
             network = self.network().to(torch_device())
         examples = [Examples(Frames(views, READ, numbers)) for numbers in (learned, apart)]
-        learner = IndirectLight(network, examples[0], examples[1], plan)
+        learner = IndirectLight(network, examples[0], examples[1], plan, mixed=self.mixed)
         steps = None if training.seconds else EPOCHS * -(-len(learned) // plan.batch)
         owner = {**self.settings, "views": views.sha256, "sources": digest(type(self).__module__)}
         trained = train(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,6 +22,7 @@ from gibench.baselines.training.loop import Batches
 from gibench.baselines.training.losses.adversarial import PatchGan, fooling, judging
 from gibench.baselines.training.losses.perceptual import Vgg16Features
 from gibench.baselines.training.losses.pixels import absolute, smooth_absolute
+from gibench.baselines.training.precision import mixed
 from gibench.baselines.training.reproducible import seeded
 from gibench.baselines.training.schedule import half_cosine, set_rate
 
@@ -73,9 +75,17 @@ class TrainingPlan:
 class IndirectLight(Learner):
     """A network of `shading.indirect`, and a discriminator of single colours that learns along."""
 
-    def __init__(self, network: nn.Module, learned: Examples, held_out: Examples, plan: TrainingPlan) -> None:
-        """network: on its device."""
-        self.learned, self.plan = learned, plan
+    def __init__(
+        self,
+        network: nn.Module,
+        learned: Examples,
+        held_out: Examples,
+        plan: TrainingPlan,
+        *,
+        mixed: bool = False,
+    ) -> None:
+        """network: on its device. mixed: whether it learns in `precision.mixed`."""
+        self.learned, self.plan, self.mixed = learned, plan, mixed
         # Read once, and before any clock says what a look takes.
         examples = [inputs_of(held_out[index]) for index in range(len(held_out))]
         self.held_out = [{name: image[None] for name, image in example.items()} for example in examples]
@@ -113,7 +123,9 @@ class IndirectLight(Learner):
         batch = _on(batch, self.device)
         set_rate(self.optimisers["network"], RATE * half_cosine(now.progress))
         inputs = Inputs.of(batch["direct"], batch["albedo"], batch["geometry"], batch["unit"])
-        light = OUTPUT.decode(self.network(inputs.light, inputs.geometry))
+        with mixed(self.device) if self.mixed else nullcontext():
+            code = self.network(inputs.light, inputs.geometry)
+        light = OUTPUT.decode(code.float())
         # Where no direct light is in view nothing can be learned: what comes out is black.
         lit = inputs.unit > 0
         truth = demodulated(batch["truth"], inputs.albedo) / torch.where(lit, inputs.unit, 1)
@@ -126,7 +138,9 @@ class IndirectLight(Learner):
         window = random_window(made.shape[-2:], LOOKED_SIDE, now.random) if looked else None
         if self.features is not None and window is not None:
             shown = _shown(batch, inputs.radiance_of(light))
-            losses["perceptual"] = self.features(*(window.of(image) for image in shown))
+            with mixed(self.device):
+                looked_at = self.features(*(window.of(image) for image in shown))
+            losses["perceptual"] = looked_at.float()
             loss = loss + LOOKED_EVERY * PERCEPTUAL * losses["perceptual"]
         discriminator = self.networks.get("judge")
         if discriminator is not None and window is not None:

@@ -77,10 +77,10 @@ class NeuralGlobalIllumination(nn.Module):
         given = inputs + 2 * size.frequencies * len(self.encoded) + (size.found if size.levels else 0)
         widths = [given, *(size.width for _ in range(size.depth - 1))]
         self.hidden = nn.ModuleList(
-            nn.Conv2d(before + (given if layer == JOINED else 0), size.width, 1)
+            nn.Linear(before + (given if layer == JOINED else 0), size.width)
             for layer, before in enumerate(widths)
         )
-        self.last = nn.Conv2d(size.width, 3, 1)
+        self.last = nn.Linear(size.width, 3)
         for layer in self.hidden:
             nn.init.kaiming_uniform_(layer.weight, nonlinearity="relu")  # type: ignore[arg-type]
             nn.init.zeros_(layer.bias)  # type: ignore[arg-type]
@@ -92,17 +92,17 @@ class NeuralGlobalIllumination(nn.Module):
                     )
                     self.hidden[number].weight[:, columns] *= self._calm()  # type: ignore[operator, index]
             self.last.weight *= CALM
-            self.last.bias.zero_()  # type: ignore[union-attr]
+            self.last.bias.zero_()
 
     def begin_at(self, code: Tensor) -> None:
         """Begin with the same code (3,) everywhere: the mean of what is to be learned."""
         with torch.no_grad():
-            self.last.bias.copy_(code)  # type: ignore[union-attr]
+            self.last.bias.copy_(code)
 
     def _calm(self) -> Tensor:
-        """Factors of the first weights of encoded inputs, (2 · frequencies · encoded, 1, 1)."""
+        """Factors of the first weights of encoded inputs, (2 · frequencies · encoded)."""
         levels = torch.arange(self.size.frequencies).repeat_interleave(len(self.encoded)).repeat(2)
-        return (0.5**levels)[:, None, None]
+        return 0.5**levels
 
     def forward(self, pixels: Tensor) -> Tensor:
         """(N, inputs, H, W) of any size, HDR among it compressed, to the code of radiance (N, 3, H, W)."""
@@ -111,13 +111,14 @@ class NeuralGlobalIllumination(nn.Module):
             parts.append(positional(pixels[:, self.encoded], self.size.frequencies, dim=1))
         if self.screen is not None:
             parts.append(self.screen(pixels))
-        given = features = torch.cat(parts, dim=1)
+        # A row of numbers for each pixel: products of matrices are faster than convolutions of single pixels.
+        given = features = torch.cat([part.movedim(1, -1) for part in parts], dim=-1)
         for layer, hidden in enumerate(self.hidden):
             if layer == JOINED:
-                features = torch.cat([features, given], dim=1)
+                features = torch.cat([features, given], dim=-1)
             features = relu(hidden(features))
         code: Tensor = self.last(features)
-        return code
+        return code.movedim(-1, 1)
 
 
 def _channels_of(names: tuple[str, ...], inputs: int) -> Tensor:

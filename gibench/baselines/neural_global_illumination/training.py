@@ -26,6 +26,7 @@ from gibench.baselines.training.learner import Learner, Step
 from gibench.baselines.training.loop import train
 from gibench.baselines.training.losses.perceptual import SMALLEST, Lpips
 from gibench.baselines.training.losses.pixels import absolute
+from gibench.baselines.training.precision import mixed
 from gibench.baselines.training.reproducible import seeded
 from gibench.baselines.training.schedule import half_cosine, set_rate
 
@@ -148,14 +149,16 @@ class Predicting(Learner):
         """Down equation 5."""
         set_rate(self.optimisers["network"], RATES[self.plan.network] * half_cosine(now.progress))
         inputs, code, rest, shown = (part.to(self.device) for part in batch)
-        output = self.network(inputs)
+        with mixed(self.device):
+            output = self.network(inputs).float()
         losses = {"pixels": absolute(output, code)}
         loss = losses["pixels"]
         if self._looks(now, code):
             window = random_window(code.shape[-2:], PERCEPTUAL_SIDE, now.random)
             images = [displayed(window.of(CODE.decode(part) * shown + rest), 1.0) for part in (output, code)]
             assert self.lpips is not None
-            losses["lpips"] = self.lpips(*images)
+            with mixed(self.device):
+                losses["lpips"] = self.lpips(*images).float()
             loss = loss + PERCEPTUAL_EVERY * PERCEPTUAL * losses["lpips"]
         self.descend("network", loss, largest_gradient=LARGEST_GRADIENT)
         return {name: value.detach() for name, value in losses.items()}

@@ -13,6 +13,8 @@ from gibench.baselines.pix2pix.network import CHANNELS, UNet
 class Pix2Pix(IndirectByNetwork):
     """See `gibench.baselines.pix2pix.METHOD`."""
 
+    mixed = False
+
     def network(self) -> nn.Module:
         """The network, untrained."""
         channels = channels_at(float(self.settings["width"]), CHANNELS)

@@ -35,8 +35,8 @@ def test_sizes_are_those_of_the_paper():
     assert round(4 * count / 2**20, 1) == 55.9
     assert sum(INPUTS.values()) == 34
     with torch.device("meta"):
-        assert NeuralGlobalIllumination(FULL).hidden[0].in_channels == 842
-        assert NeuralGlobalIllumination(FULL).hidden[4].in_channels == 256 + 842
+        assert NeuralGlobalIllumination(FULL).hidden[0].in_features == 842
+        assert NeuralGlobalIllumination(FULL).hidden[4].in_features == 256 + 842
     assert parameters(SMALL) < 1.3e6
 
 
