@@ -8,10 +8,14 @@ import re
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
+
+import psutil
 
 ENVIRONMENT = {**os.environ, "PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path)}
 
@@ -32,8 +36,12 @@ def scheduler(file: Path, port: int = 0) -> subprocess.Popen[bytes]:
     return process
 
 
-def worker(file: Path, name: str, threads: int | None = None) -> subprocess.Popen[bytes]:
+def worker(
+    file: Path, name: str, threads: int | None = None, *, nanny: bool = True
+) -> subprocess.Popen[bytes]:
+    """nanny: whether a process of its own starts it again when it dies."""
     words = ["--scheduler-file", str(file), "--name", name, "--no-dashboard", "--death-timeout", "300"]
+    words += ["--nanny" if nanny else "--no-nanny"]
     return dask("worker", *words, "--nthreads", str(threads or os.cpu_count() or 1))
 
 
@@ -92,6 +100,45 @@ def two_workers(folder: Path) -> Iterator[Path]:
         yield folder / "scheduler-17.json"
     finally:
         killed(job)
+
+
+@contextmanager
+def no_patience_with_stopped_workers(address: str) -> Iterator[None]:
+    """Within: a worker of this machine that is stopped has at once been silent for as long as its scheduler bears.
+
+    Nobody waits for the limit, and none has to be so short that a worker of a busy machine is taken for a stopped one.
+    """
+    from distributed import Client
+
+    over = threading.Event()
+
+    def watch() -> None:
+        with Client(address, set_as_default=False) as client:
+            while not over.wait(0.2):
+                client.run_on_scheduler(_forget_stopped_workers)
+
+    thread = threading.Thread(target=watch)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
+
+
+def _forget_stopped_workers(dask_scheduler: Any) -> None:
+    for one in dask_scheduler.workers.values():
+        with contextlib.suppress(psutil.Error):
+            if psutil.Process(one.pid).status() == psutil.STATUS_STOPPED:
+                one.last_seen = time.time() - dask_scheduler.worker_ttl - 0.1
+
+
+def idle(file: Path) -> bool:
+    """Whether no worker of a scheduler is at a task."""
+    from distributed import Client
+
+    with Client(scheduler_file=str(file), set_as_default=False) as client:
+        return not any(client.run(lambda dask_worker: len(dask_worker.state.executing)).values())
 
 
 def wait_until(condition, seconds: float = 120) -> None:

@@ -34,3 +34,25 @@ def workplace(tmp_path_factory):
 
     with two_workers(tmp_path_factory.mktemp("dask")) as file:
         yield file
+
+
+@pytest.fixture
+def no_patience(monkeypatch):
+    """Clusters of this machine whose workers count as silent for too long as soon as they are stopped."""
+    from contextlib import contextmanager
+
+    from gibench.datasets import cluster_opening
+    from tests.clusters import no_patience_with_stopped_workers
+
+    real = cluster_opening.opened
+
+    @contextmanager
+    def opened(cluster, *tasks):
+        with real(cluster, *tasks) as address:
+            if not cluster.startswith("local:"):
+                yield address
+                return
+            with no_patience_with_stopped_workers(address):
+                yield address
+
+    monkeypatch.setattr(cluster_opening, "opened", opened)

@@ -58,6 +58,14 @@ def test_importing_a_room_loads_neither_mitsuba_nor_torch(room):
     assert result.stdout.strip() == "[]", result.stdout + result.stderr
 
 
+def test_a_command_on_datasets_starts_without_what_builds_and_lights_rooms():
+    """Each takes a third of a second to two, and every process of a run and every reader of a dataset would pay it."""
+    slow = {"scipy", "skimage", "colour", "pandas", "mitsuba"}
+    code = f"import sys, gibench.datasets.making, gibench.generators.rooms; print(sorted({slow} & set(sys.modules)))"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    assert result.stdout.strip() == "[]", result.stdout + result.stderr
+
+
 def test_what_networks_share_needs_no_renderer():
     room = PACKAGE / "baselines" / "training"
     allowed = ("gibench.metrics", "gibench.errors", "gibench.baselines.training")

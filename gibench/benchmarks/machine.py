@@ -52,8 +52,8 @@ def _look(connection: Connection, variant: str, threads: int) -> None:
 
 
 def _facts(variant: str, threads: int) -> dict[str, Any]:
-    from gibench.datasets.room_making import machine
     from gibench.rendering import backend
+    from gibench.rendering.machine import machine
 
     chosen = backend.select_variant(variant)
     facts = machine()

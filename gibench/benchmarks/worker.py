@@ -185,7 +185,6 @@ class _SceneSession:
         self.rig: Any = None
 
     def run(self, started: float) -> None:
-        from gibench.rendering.light_rig import LightRig
         from gibench.rendering.scene import load_scene
 
         task, files = self.task, self.scene
@@ -193,6 +192,8 @@ class _SceneSession:
         scene = load_scene(folder / "scene.xml", share_kernels=True)
         kinds = {shot.lighting.kind for shot in files.shots}
         if kinds != {"own"}:
+            from gibench.rendering.light_rig import LightRig
+
             self.rig = LightRig(scene, panoramas="environment" in kinds)
             scene = self.rig.scene
         views = [training_set(None if task.rooms else task.training, files.room)]

@@ -36,7 +36,7 @@ def doctor(as_json: Annotated[bool, typer.Option("--json", help="For programs.")
 
 def examine() -> dict[str, Any]:
     """Return what `backend.describe` says, and `machine`, `packages` and `lpips_weights`; all JSON-able."""
-    from gibench.datasets.room_making import machine
+    from gibench.rendering.machine import machine
 
     facts = {**_rendering(), "machine": machine(), "packages": _packages(), "lpips_weights": _weights()}
     weights = facts["lpips_weights"]

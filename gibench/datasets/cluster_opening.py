@@ -17,7 +17,7 @@ from gibench.datasets.errors import ClusterError
 from gibench.datasets.pool import MOST_WORKERS
 
 if TYPE_CHECKING:
-    from distributed import Client
+    from distributed import Client, Scheduler
 
 #: Seconds that a scheduler and its first worker may take to answer, and a scheduler that was lost to come back.
 PATIENCE = 60.0
@@ -60,11 +60,20 @@ def opened(cluster: str, tasks: int = MOST_WORKERS) -> Iterator[str]:
                 silence_logs=logging.CRITICAL,
             ) as there,
         ):
+            there.sync(_look_every_second, there.scheduler)
             yield there.scheduler_address
         return
     if cluster.endswith(".json") and not Path(cluster).is_file():
         raise ClusterError(f"--cluster: there is no scheduler file {cluster}: `dask scheduler` writes one")
     yield cluster
+
+
+async def _look_every_second(scheduler: Scheduler) -> None:
+    """For workers that are silent. Dask looks as often as they may be: one could be so for twice as long."""
+    look = scheduler.periodic_callbacks["worker-ttl"]
+    look.stop()
+    look.callback_time = 1000.0
+    look.start()
 
 
 @contextlib.contextmanager

@@ -21,8 +21,9 @@ from gibench.datasets.errors import Interrupted, MakingError
 from gibench.datasets.files import write_whole
 from gibench.datasets.previews import contact_sheet, write_picture
 from gibench.datasets.recipes import Recipe
-from gibench.datasets.room_making import Renderer, RoomMaker, imported, machine
+from gibench.datasets.room_making import Renderer, RoomMaker, imported
 from gibench.datasets.unfinished import unfinished_rooms
+from gibench.rendering.machine import machine
 
 
 @dataclass

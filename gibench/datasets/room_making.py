@@ -6,13 +6,12 @@ import errno
 import hashlib
 import importlib.metadata
 import math
-import platform
 import shutil
 import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -28,8 +27,8 @@ from gibench.datasets.recipes import ENVIRONMENTS, Recipe
 from gibench.datasets.records import PROCESSOR
 from gibench.datasets.splits import split_of
 from gibench.generators.parts import Room
-from gibench.generators.scene_files import lighting_record
 from gibench.generators.shots import shot_before, shot_of
+from gibench.rendering.machine import processor
 from gibench.rendering.panoramas import Panorama
 
 if TYPE_CHECKING:
@@ -324,6 +323,8 @@ class RoomMaker:
 
     def _known(self, room: Room | ImportedRoom, view: int) -> dict[str, Any]:
         """What the record of a frame says that is known before it is rendered."""
+        from gibench.generators.scene_files import lighting_record
+
         camera = room.cameras[view]
         return {
             "view": view,
@@ -362,7 +363,7 @@ class RoomMaker:
             "kernel_seconds": rendered.kernel_seconds,
             "denoise_seconds": rendered.denoise_seconds,
             "denoise_change": rendered.denoise_change,
-            "processor": processor(),
+            "processor": processor()[:PROCESSOR],
             "seconds": rendered.seconds,
         }
         unfinished.write_down(folder, record)
@@ -392,38 +393,6 @@ class Stopwatch:
         now = time.perf_counter()
         self.laps[name] = now - self._last
         self._last = now
-
-
-def machine() -> dict[str, Any]:
-    """The machine that the dataset is made on: operating system, processor, cores, memory (bytes), Python."""
-    import psutil
-
-    return {
-        "platform": platform.platform(),
-        "cpu": _cpu(),
-        "cores": psutil.cpu_count(logical=True),
-        "memory": psutil.virtual_memory().total,
-        "python": platform.python_version(),
-    }
-
-
-def processor() -> str:
-    """Name of what renders in this process: of the GPU where the variant is CUDA's, else of the CPU."""
-    from gibench.rendering import backend
-
-    variant = backend.current_variant()
-    name = (backend.find_gpu() if variant.startswith("cuda") else None) or _cpu()
-    return " ".join(name.split())[:PROCESSOR]
-
-
-@cache
-def _cpu() -> str:
-    information = Path("/proc/cpuinfo")
-    if information.is_file():
-        for line in information.read_text(encoding="utf-8", errors="replace").splitlines():
-            if line.startswith("model name"):
-                return line.split(":", 1)[1].strip()
-    return platform.processor() or platform.machine()
 
 
 def _fingerprint(content: bytes) -> dict[str, Any]:

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
-from scipy.interpolate import CubicSpline
 
 from gibench.errors import GibenchError
 from gibench.generators.parts import Camera, FloatArray
@@ -246,6 +245,8 @@ def _aimed(xy: FloatArray, aim: FloatArray) -> FloatArray:
 
 
 def _walk(rng: np.random.Generator, stage: ViewSpace, frames: int) -> Curve | None:
+    from scipy.interpolate import CubicSpline  # not needed by those who build no room
+
     best: FloatArray | None = None
     for _ in range(12):
         knots = stage.points(rng, 4)

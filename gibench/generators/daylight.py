@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from gibench.errors import GibenchError
 from gibench.generators.light import LUMENS_PER_WATT
 from gibench.generators.parts import Environment
-from gibench.rendering.latlong import LUMINANCE
+from gibench.rendering.lighting import LUMINANCE
 
 KINDS = ("none", "sunsky", "hdr")
 

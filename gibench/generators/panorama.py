@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from gibench.generators.daylight import environment_xml, read_panorama
 from gibench.generators.parts import Environment
-from gibench.rendering.latlong import directions, resampled
 
 HEIGHT = 512
 """Rows; twice as many texels go around the horizon: one is 0.35° wide, two thirds of the sun's disc."""
@@ -34,6 +33,9 @@ def panorama(environment: Environment) -> NDArray[np.float32]:
     Laid out as `gibench.rendering.latlong` says, before the rotation of an "hdr" environment. The sun is averaged over
     the texels that it touches, so that its light is all there.
     """
+    # It loads SciPy, which those who only read of rooms do not need.
+    from gibench.rendering.latlong import directions, resampled
+
     if environment.kind == "hdr":
         own = read_panorama(str(environment.parameters["path"])) * float(environment.parameters["scale"])
         return resampled(own, min(len(own), HEIGHT))

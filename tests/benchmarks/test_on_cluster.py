@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,12 +21,12 @@ from gibench.benchmarks.orders import Order, ordered_methods
 from gibench.benchmarks.registry import Found
 from gibench.benchmarks.result_files import RunFolder
 from gibench.benchmarks.running import run
+from gibench.benchmarks.track import check_track
 from gibench.cli import bench_printing
-from gibench.datasets import cluster_opening
 from gibench.datasets.errors import ClusterError, FolderError, MakingError
 from gibench.errors import GibenchError
 from tests.benchmarks import toys
-from tests.benchmarks.conftest import order
+from tests.benchmarks.conftest import TINY, order
 from tests.benchmarks.test_training_on_rooms import track
 from tests.clusters import ENVIRONMENT, killed, scheduler, wait_until, worker
 from tests.datasets.disks import small_disk
@@ -132,18 +133,22 @@ def test_a_disk_that_is_full_in_truth(workplace, made, scenes_only, tmp_path):
         assert left_behind(root) == []
 
 
-#: One result comes, the next one never does.
-ENDLESS = {"constant": {"pause": (0.1,)}, "wrong": {"how": ("hang",)}}
+def endless(cluster) -> Order:
+    """One result comes, the next one of that process never does, nor does any limit end it."""
+    values = deepcopy(TINY)
+    values["presets"]["tiny"]["budget"] = {"prepare": 600, "render": 600}
+    overrides = {"wrong": {"how": ("well", "hang")}}
+    asked = order(toys.WRONG, toys.CONSTANT, overrides=overrides, cluster=str(cluster))
+    return replace(asked, track=check_track(values))
+
+
 RUN = """
 import sys
 from pathlib import Path
 from gibench.benchmarks.running import run
-from tests.benchmarks.conftest import order
-from tests.benchmarks.test_on_cluster import ENDLESS
-from tests.benchmarks import toys
+from tests.benchmarks.test_on_cluster import endless
 if __name__ == "__main__":
-    asked = order(toys.CONSTANT, toys.WRONG, overrides=ENDLESS, cluster=sys.argv[2])
-    run(Path(sys.argv[1]), asked)
+    run(Path(sys.argv[1]), endless(sys.argv[2]))
 """
 
 
@@ -160,9 +165,8 @@ def test_ctrl_c_ends_the_processes_of_the_workers(workplace, scenes_only):
         if state.record is not None:
             raise KeyboardInterrupt
 
-    asked = order(toys.CONSTANT, toys.WRONG, overrides=ENDLESS, cluster=str(workplace))
-    with pytest.raises(Interrupted, match="stopped with 1 of 3 results there; to continue run"):
-        run(scenes_only, asked, on_state=stop)
+    with pytest.raises(Interrupted, match="stopped with 1 of 4 results there; to continue run"):
+        run(scenes_only, endless(workplace), on_state=stop)
     wait_for_the_processes_of(scenes_only)
     assert left_behind(scenes_only) == []
 
@@ -178,8 +182,7 @@ def test_a_run_that_is_killed_ends_the_processes_of_the_workers_and_another_goes
         killed(process)
     before = {id: folder.result_file(id).read_bytes() for id in folder.ids()}
     wait_for_the_processes_of(scenes_only)
-    asked = order(toys.CONSTANT, overrides=ENDLESS, cluster=str(workplace))
-    report = run(scenes_only, asked)
+    report = run(scenes_only, order(toys.CONSTANT, cluster=str(workplace)))
     assert report.made == len(set(report.ids) - before.keys())
     assert {id: folder.result_file(id).read_bytes() for id in before} == before
     assert [entry["ended"] for entry in folder.read_run()["runs"]][-2:] == [False, True]
@@ -188,13 +191,13 @@ def test_a_run_that_is_killed_ends_the_processes_of_the_workers_and_another_goes
 
 def test_a_scheduler_that_is_killed_and_started_again(made, scenes_only, tmp_path):
     file, replaced = tmp_path / "scheduler.json", []
-    processes = [scheduler(file), worker(file, "first")]
+    processes = [scheduler(file), worker(file, "first", nanny=False)]
 
     def break_off(state) -> None:
         if state.record is not None and not replaced:
             killed(*processes)
             replaced.append(state.record["id"])
-            processes[:] = [scheduler(file), worker(file, "second")]
+            processes[:] = [scheduler(file), worker(file, "second", nanny=False)]
 
     try:
         asked = order(toys.PLAIN, overrides=OVERRIDES, cluster=str(file))
@@ -256,9 +259,8 @@ def test_one_kind_of_machine_measures_and_the_others_are_told(tmp_path, monkeypa
     assert crew.examined(Doing)["cpu"] == "A"  # a run that was begun goes on where it was measured
 
 
-def test_rooms_trainings_and_results_from_nothing_on_a_cluster_of_this_machine(tmp_path, monkeypatch):
+def test_rooms_trainings_and_results_from_nothing_on_a_cluster_of_this_machine(no_patience, tmp_path):
     """Among them a training whose worker hangs, which another does, and one that takes three workers with it."""
-    monkeypatch.setattr(cluster_opening, "SILENCE", 20.0)  # a busy machine is silent too
     root, told = tmp_path / "run", []
     hows = {"learner": {"how": ("stopping", "deadly", "failing")}}
     chosen = ordered_methods(track(), "tiny", [toys.LEARNER], hows)

@@ -9,7 +9,6 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,7 +22,7 @@ from gibench.datasets.errors import ClusterError, FolderError, Interrupted, Maki
 from gibench.datasets.making import make
 from gibench.datasets.pool import Report
 from gibench.datasets.room_making import RoomMaker
-from tests.clusters import ENVIRONMENT, dask, killed, scheduler, wait_until
+from tests.clusters import ENVIRONMENT, dask, idle, killed, scheduler, wait_until
 from tests.datasets.disks import small_disk
 from tests.datasets.fakes import Broken, Killed, Setup, fake_work, tiny
 
@@ -37,9 +36,17 @@ def frames_of(root: Path) -> dict[str, str]:
     }
 
 
-def made_locally(root: Path, rooms: int) -> dict[str, str]:
-    make(root, tiny(rooms), work=fake_work(root, tiny(rooms)))
+@pytest.fixture(scope="module")
+def made_locally(tmp_path_factory) -> dict[str, str]:
+    """Frames of six rooms."""
+    root = tmp_path_factory.mktemp("local") / "d"
+    make(root, tiny(6), work=fake_work(root, tiny(6)))
     return frames_of(root)
+
+
+def first(rooms: int, frames: dict[str, str]) -> dict[str, str]:
+    """Those of so many rooms."""
+    return {name: content for name, content in frames.items() if int(name.split("/")[1]) < rooms}
 
 
 def left_behind(root: Path) -> list[str]:
@@ -55,18 +62,48 @@ def names_on_the_dashboard(file: Path) -> set[str]:
         return {key_split(key) for keys in client.processing().values() for key in keys}
 
 
-def test_a_cluster_of_this_machine_and_a_local_run_make_the_same_and_go_on_for_each_other(tmp_path):
-    expected = made_locally(tmp_path / "local", 5)
+@dataclass
+class Stopped:
+    """A job whose worker is stopped in the middle of one room, the first time."""
+
+    job: RoomMaker
+    room: int
+
+    def __call__(self, room: int, report: Report):
+        mark = self.job.root.parent / "stopped"
+        if room == self.room and not mark.exists():
+            mark.write_text(str(os.getpid()))
+            os.kill(os.getpid(), signal.SIGSTOP)
+        return self.job(room, report)
+
+
+def test_a_cluster_of_this_machine_and_a_local_run_make_the_same_and_go_on_for_each_other(
+    no_patience, made_locally, tmp_path
+):
+    """Though a worker hangs: it is given up, and its room made by another."""
     root = tmp_path / "both"
-    summary = make(root, tiny(3), cluster="local:2", work=fake_work(root, tiny(3)))
-    assert (summary.made, summary.frames) == (3, 6)
+    work = pool.Work(Setup(), Stopped(RoomMaker(root, tiny(4)), 1))
+    summary = make(root, tiny(4), cluster="local:2", work=work)
+    assert (tmp_path / "stopped").exists()
+    assert (summary.made, summary.frames) == (4, 8)
     assert left_behind(root) == []
-    make(root, tiny(5), work=fake_work(root, tiny(5)))
-    assert frames_of(root) == expected
+    make(root, tiny(6), work=fake_work(root, tiny(6)))
+    assert frames_of(root) == made_locally
     assert open_dataset(root).manifest["complete"]
 
 
-def test_workers_started_by_hand_that_die_hang_and_refuse(workplace, tmp_path):
+def test_a_worker_of_a_cluster_of_this_machine_is_looked_for_every_second():
+    """So what is given up after a minute of silence has been silent for no second one."""
+    from distributed import Client
+
+    def limits(dask_scheduler) -> tuple[float, float]:
+        return dask_scheduler.worker_ttl, dask_scheduler.periodic_callbacks["worker-ttl"].callback_time
+
+    with cluster_opening.opened("local:1") as address, Client(address, set_as_default=False) as client:
+        assert client.run_on_scheduler(limits) == (cluster_opening.SILENCE, 1000.0)
+
+
+def test_workers_started_by_hand_that_die_and_fail(workplace, made_locally, tmp_path):
     """One after another on the same cluster: what happens to one run leaves the workers to the next."""
     root = tmp_path / "plain"
     seen, shown = [], set()
@@ -77,7 +114,7 @@ def test_workers_started_by_hand_that_die_hang_and_refuse(workplace, tmp_path):
             shown.update(names_on_the_dashboard(workplace))
 
     make(root, tiny(6), cluster=str(workplace), work=fake_work(root, tiny(6), slow=0.1), on_progress=look)
-    assert frames_of(root) == made_locally(tmp_path / "local", 6)
+    assert frames_of(root) == made_locally
     assert seen[-1] == (6, 12)
     assert shown
     assert shown <= {f"room {number}" for number in range(6)}
@@ -87,7 +124,7 @@ def test_workers_started_by_hand_that_die_hang_and_refuse(workplace, tmp_path):
     root = tmp_path / "killed"
     work = pool.Work(Setup(), Killed(RoomMaker(root, tiny(4)), room=1, times=1))
     make(root, tiny(4), cluster=str(workplace), work=work)
-    assert list(frames_of(root)) == [name for name in frames_of(tmp_path / "local") if "00000" in name][:8]
+    assert frames_of(root) == first(4, made_locally)
     assert left_behind(root) == []
 
     # A job that fails ends the run with its reason; what is whole stays.
@@ -112,10 +149,10 @@ def test_a_disk_that_is_full_in_truth(workplace, tmp_path):
         assert open_dataset(root).manifest["complete"] is False
 
 
-def test_a_room_that_takes_three_workers_with_it_is_set_aside_by_name(tmp_path):
+def test_a_room_that_takes_three_workers_with_it_is_set_aside_by_name(workplace, tmp_path):
     root = tmp_path / "d"
     work = pool.Work(Setup(), Killed(RoomMaker(root, tiny(4)), room=1, times=99))
-    summary = make(root, tiny(4), cluster="local:2", work=work)
+    summary = make(root, tiny(4), cluster=str(workplace), work=work)
     assert summary.made == 3
     assert list(summary.manifest["rejected_rooms"]) == ["1"]
     assert "3 workers that made it died" in summary.manifest["rejected_rooms"]["1"]
@@ -123,78 +160,56 @@ def test_a_room_that_takes_three_workers_with_it_is_set_aside_by_name(tmp_path):
     assert left_behind(root) == []
 
 
-@dataclass
-class Stopped:
-    """A job whose worker is stopped in the middle of one room, the first time."""
-
-    job: RoomMaker
-    room: int
-
-    def __call__(self, room: int, report: Report):
-        mark = self.job.root.parent / "stopped"
-        if room == self.room and not mark.exists():
-            mark.write_text(str(os.getpid()))
-            os.kill(os.getpid(), signal.SIGSTOP)
-        return self.job(room, report)
+def known_clients(dask_scheduler) -> set[str]:
+    return {key for key in dask_scheduler.clients if key != "fire-and-forget"}
 
 
-def test_a_worker_that_hangs_is_given_up_and_its_room_made_by_another(tmp_path, monkeypatch):
-    monkeypatch.setattr(cluster_opening, "SILENCE", 20.0)  # a busy machine is silent too
-    root = tmp_path / "d"
-    make(root, tiny(4), cluster="local:2", work=pool.Work(Setup(), Stopped(RoomMaker(root, tiny(4)), 1)))
-    assert (tmp_path / "stopped").exists()
-    assert frames_of(root) == made_locally(tmp_path / "local", 4)
+def found_again(address: str) -> bool:
+    """Whether a scheduler has a client, beside the one that asks."""
+    from distributed import Client
+
+    with Client(address, set_as_default=False) as client:
+        return len(client.run_on_scheduler(known_clients)) > 1
 
 
-@pytest.mark.parametrize("noticed", [False, True])
-def test_a_scheduler_that_is_killed_and_started_again(tmp_path, noticed):
-    """noticed: before the run looks again, Dask's client has found the new one by itself, and waits for nothing."""
+def test_a_scheduler_that_is_killed_and_started_again_and_one_whose_workers_are_gone(
+    made_locally, tmp_path, monkeypatch
+):
+    """The second time Dask's client has found the new one by itself before the run looks again."""
     file, root = tmp_path / "scheduler.json", tmp_path / "d"
-    first = scheduler(file)
+    there = [scheduler(file)]
     port = int(file.read_text().split("tcp://127.0.0.1:")[1].split('"')[0])
     address = f"tcp://127.0.0.1:{port}"
-    words = ["worker", address, "--nthreads", "1", "--no-dashboard", "--death-timeout", "120"]
-    worker, replaced = dask(*words), []
+    words = ["worker", address, "--nthreads", "1", "--no-dashboard", "--no-nanny", "--death-timeout", "120"]
+    there.append(dask(*words))
+    breaks = []
 
     def break_off(progress) -> None:
-        if progress.rooms_done == 2 and not replaced:
-            killed(first, worker)
-            replaced.extend([scheduler(file, port), dask(*words)])
-            time.sleep(5.0 if noticed else 0.0)
+        if len(breaks) < 2 and progress.rooms_done == 2 * len(breaks) + 2:
+            breaks.append(progress.rooms_done)
+            killed(*there)
+            there[:] = [scheduler(file, port), dask(*words)]
+            if len(breaks) == 2:
+                wait_until(lambda: found_again(address))
+
+    def kill_worker(progress) -> None:
+        if progress.rooms_done == 1:
+            killed(there[1])
 
     try:
         work = fake_work(root, tiny(6), slow=0.05)
         make(root, tiny(6), cluster=address, work=work, on_progress=break_off)
-        assert replaced
-        assert frames_of(root) == made_locally(tmp_path / "local", 6)
-    finally:
-        killed(first, worker, *replaced)
+        assert breaks == [2, 4]
+        assert frames_of(root) == made_locally
 
-
-def test_a_run_whose_workers_are_all_gone_ends(tmp_path, monkeypatch):
-    monkeypatch.setattr(cluster_opening, "ABANDONED", 2.0)
-    file, root = tmp_path / "scheduler.json", tmp_path / "d"
-    processes = [
-        scheduler(file),
-        dask("worker", "--scheduler-file", str(file), "--nthreads", "1", "--no-nanny"),
-    ]
-
-    def kill_worker(progress) -> None:
-        if progress.rooms_done == 1:
-            killed(processes[1])
-
-    try:
-        with pytest.raises(ClusterError, match="no worker has been there for 2 s: start some"):
-            make(
-                root,
-                tiny(4),
-                cluster=str(file),
-                work=fake_work(root, tiny(4), slow=0.05),
-                on_progress=kill_worker,
-            )
+        monkeypatch.setattr(cluster_opening, "ABANDONED", 1.0)
+        root = tmp_path / "abandoned"
+        work = fake_work(root, tiny(4), slow=0.05)
+        with pytest.raises(ClusterError, match="no worker has been there for 1 s: start some"):
+            make(root, tiny(4), cluster=str(file), work=work, on_progress=kill_worker)
         assert folder.whole_rooms(root)
     finally:
-        killed(*processes)
+        killed(*there)
 
 
 def test_ctrl_c_stops_rooms_that_are_being_made_and_keeps_those_that_are_whole(workplace, tmp_path):
@@ -204,17 +219,14 @@ def test_ctrl_c_stops_rooms_that_are_being_made_and_keeps_those_that_are_whole(w
         if progress.rooms_done >= 2:
             raise KeyboardInterrupt
 
-    work = fake_work(root, tiny(30), slow=0.2)
-    with pytest.raises(Interrupted, match=r"of 30 rooms whole; to continue run `again`"):
-        make(root, tiny(30), cluster=str(workplace), work=work, command="again", on_progress=stop)
+    work = fake_work(root, tiny(12), slow=0.2)
+    with pytest.raises(Interrupted, match=r"of 12 rooms whole; to continue run `again`"):
+        make(root, tiny(12), cluster=str(workplace), work=work, command="again", on_progress=stop)
     assert open_dataset(root).manifest["complete"] is False
-    time.sleep(1.0)  # rooms in hand end at their next frame
-    whole = folder.whole_rooms(root)
-    assert 2 <= len(whole) <= 6
-    time.sleep(1.0)
-    assert folder.whole_rooms(root) == whole
-    make(root, tiny(30), cluster=str(workplace), work=fake_work(root, tiny(30)))
-    assert len(frames_of(root)) == 60
+    wait_until(lambda: idle(workplace))  # rooms in hand end at their next frame
+    assert 2 <= len(folder.whole_rooms(root)) <= 6
+    make(root, tiny(12), cluster=str(workplace), work=fake_work(root, tiny(12)))
+    assert len(frames_of(root)) == 24
     assert left_behind(root) == []
 
 
@@ -225,8 +237,8 @@ from gibench.datasets.making import make
 from tests.datasets.disks import small_disk
 from tests.datasets.fakes import fake_work, tiny
 if __name__ == "__main__":
-    root, recipe = Path(sys.argv[1]), tiny(2, views=100)
-    make(root, recipe, cluster=sys.argv[2], work=fake_work(root, recipe, slow=0.2))
+    root, recipe = Path(sys.argv[1]), tiny(2, views=50)
+    make(root, recipe, cluster=sys.argv[2], work=fake_work(root, recipe, slow=0.4))
 """
 
 
@@ -241,8 +253,8 @@ def test_a_run_that_is_killed_takes_its_rooms_with_it_and_another_goes_on(workpl
         killed(process)
     wait_until(lambda: not list(root.glob("rooms/.0*")))  # they would take 20 s
     assert folder.whole_rooms(root) == []
-    summary = make(root, tiny(2, views=100), cluster=str(workplace), work=fake_work(root, tiny(2, views=100)))
-    assert (summary.made, summary.frames) == (2, 200)
+    summary = make(root, tiny(2, views=50), cluster=str(workplace), work=fake_work(root, tiny(2, views=50)))
+    assert (summary.made, summary.frames) == (2, 100)
     assert [run["ended"] for run in summary.manifest["runs"]] == [False, True]
     assert left_behind(root) == []
 
@@ -267,6 +279,8 @@ def test_two_runs_on_one_folder(workplace, tmp_path):
 
 
 def test_clusters_that_cannot_be_used(workplace, tmp_path, monkeypatch, capsys):
+    from distributed import LocalCluster
+
     def refused(words: list[str]) -> str:
         out = ["--out", str(tmp_path / "d"), "--preset", "smoke"]
         assert run(make_app, [*out, *words]) == 2
@@ -281,14 +295,25 @@ def test_clusters_that_cannot_be_used(workplace, tmp_path, monkeypatch, capsys):
     assert "there is no scheduler file" in refused(["--cluster", str(tmp_path / "none.json")])
     (other := tmp_path / "other.json").write_text('{"rooms": 3}')
     assert "is not what `dask scheduler --scheduler-file` writes" in refused(["--cluster", str(other)])
-    monkeypatch.setattr(cluster_opening, "PATIENCE", 1.0)
-    assert "nobody answers at tcp://127.0.0.1:9" in refused(["--cluster", "tcp://127.0.0.1:9"])
-    lonely = scheduler(tmp_path / "lonely.json")
-    try:
-        assert "has no workers: start some with" in refused(["--cluster", str(tmp_path / "lonely.json")])
-    finally:
-        killed(lonely)
-    monkeypatch.setattr(cluster_opening, "PATIENCE", 60.0)
+    with monkeypatch.context() as changed:
+        changed.setattr(cluster_opening, "PATIENCE", 0.5)
+        assert "nobody answers at tcp://127.0.0.1:9" in refused(["--cluster", "tcp://127.0.0.1:9"])
+
+    # The scheduler has all the time that it needs, its workers have none.
+    connected = cluster_opening.connected
+
+    @contextlib.contextmanager
+    def lonely(*given, **more):
+        with connected(*given, **more) as client, monkeypatch.context() as changed:
+            changed.setattr(cluster_opening, "PATIENCE", 0.5)
+            yield client
+
+    with (
+        LocalCluster(n_workers=0, dashboard_address=":0", scheduler_kwargs={"dashboard": False}) as empty,
+        monkeypatch.context() as changed,
+    ):
+        changed.setattr(cluster_opening, "connected", lonely)
+        assert "has no workers: start some with" in refused(["--cluster", empty.scheduler_address])
 
     # A folder of the same path that is another one on the workers.
     unseen = contextlib.nullcontext(tmp_path / "d" / ".cluster-0")

@@ -10,11 +10,12 @@ import pytest
 
 from gibench.cli import run
 from gibench.cli.app import app
-from gibench.datasets import open_dataset, room_making
+from gibench.datasets import open_dataset
 from gibench.datasets.exr import encode, layer_names, stored_types
 from gibench.datasets.manifest import gathered, read_manifest, write_manifest, write_table
 from gibench.datasets.verifying import frame_faults, verify
 from gibench.rendering.channels import CHANNELS
+from gibench.rendering.machine import processor
 from tests.datasets.fakes import pixels, tiny
 
 
@@ -131,7 +132,7 @@ def test_a_sum_that_another_program_rounded_differently_is_found(tmp_path):
 def test_rooms_of_several_processors_are_told(copy, capsys):
     here = open_dataset(copy).frames["processor"]
     assert here.nunique() == 1
-    assert here[0] == room_making.processor() != ""
+    assert here[0] == processor() != ""
     assert "processors" not in told(copy, capsys)
 
     for room, name in (

@@ -1,4 +1,5 @@
 import math
+import sys
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from gibench.generators.parts import Light
 from gibench.rendering.backend import select_variant
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+TONES = (2700.0, 3000.0, 3500.0, 4000.0, 5000.0, 6500.0)
 
 
 def light(shape="rectangle", size=(0.6, 0.3), lumens=1000.0, kelvin=3000.0) -> Light:
@@ -86,6 +88,12 @@ def test_colour_of_a_black_body(kelvin, xy):
     assert (x / (x + y + z), y / (x + y + z)) == pytest.approx(xy, abs=1e-3)
 
 
+def test_tones_of_rooms_are_those_of_the_library_without_it(monkeypatch):
+    beside = [kelvin_to_rgb(kelvin + 1e-7) for kelvin in TONES]
+    monkeypatch.setitem(sys.modules, "colour", None)
+    assert np.allclose([kelvin_to_rgb(kelvin) for kelvin in TONES], beside, rtol=1e-9, atol=0)
+
+
 def test_colours_have_luminance_one_and_grow_bluer():
     kelvins = [1000.0, 1500.0, 2000.0, 2700.0, 4000.0, 6500.0, 12000.0, 25000.0]
     colors = np.array([kelvin_to_rgb(k) for k in kelvins])
@@ -131,6 +139,6 @@ def test_sampled_lights_stay_in_their_ranges():
     rooms = [sample_room_flux(rng, area) for area in np.linspace(8, 60, 300)]
     assert ROOM_LUMENS[0] <= min(rooms)
     assert max(rooms) <= ROOM_LUMENS[1]
-    assert {sample_kelvin(rng) for _ in range(300)} == {2700.0, 3000.0, 3500.0, 4000.0, 5000.0, 6500.0}
+    assert {sample_kelvin(rng) for _ in range(300)} == set(TONES)
     with pytest.raises(BadLight, match="floor"):
         sample_room_flux(rng, 0.0)

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from gibench.generators.daylight import BadEnvironment, read_panorama
 from gibench.generators.environments.shipped import ShippedMap, shipped_maps
-from gibench.rendering.latlong import resampled
 from gibench.rendering.panoramas import HEIGHT
 
 SUFFIXES = (".exr", ".hdr")
@@ -88,6 +87,9 @@ def read_environment(path: str | Path, height: int = HEIGHT) -> NDArray[np.float
     Raises BadEnvironment for a file that is no image, holds NaN, infinity or a negative value, is black, or is not
     twice as wide as high.
     """
+    # It loads SciPy, which those who only name environments do not need.
+    from gibench.rendering.latlong import resampled
+
     image = read_panorama(str(path))
     if not image.any():
         raise BadEnvironment(f"hdr {path}: it is black; give a panorama with light in it")

@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-import scipy.fft
 from numpy.typing import NDArray
 
 Map = NDArray[np.float32]
@@ -26,6 +25,8 @@ def band_noise(
     power-law fall-off towards high frequencies added to the band (0 none; 1 makes clouds with detail in
     them).
     """
+    import scipy.fft  # takes a third of a second, which those who build no room should not pay
+
     amplitude = _filter(shape, cycles, width, slope)
     # A texel sums thousands of coefficients, so even coarse uniform ones give Gaussian noise; bytes are drawn fastest.
     coefficients = np.frombuffer(rng.bytes(2 * amplitude.size), np.int8).astype(np.float32)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from skimage.measure import marching_cubes
 
 from gibench.generators.parts import FloatArray, Mesh
 
@@ -21,6 +20,8 @@ def figure(limbs: Sequence[Limb], height: float, blend: float) -> Mesh:
 
     limbs: in any unit. blend: over which distance they run into each other, in that unit. UVs are x and y, metres.
     """
+    from skimage.measure import marching_cubes  # not needed by those who build rooms
+
     ends = np.array([[a, b] for a, b, _, _ in limbs], dtype=np.float64)
     radii = np.array([[ra, rb] for _, _, ra, rb in limbs])
     low = (ends - radii[..., None]).min(axis=(0, 1)) - blend
