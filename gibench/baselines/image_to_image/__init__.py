@@ -24,6 +24,13 @@ KNOBS = (
         "pixels along a side of what a step sees of a frame",
         trains=True,
     ),
+    Knob(
+        "images",
+        1.0,
+        (0.125, 0.25, 0.5, 1.0),
+        "share of the training frames, by whole rooms where there are several",
+        trains=True,
+    ),
     Knob("batch", 1, (1, 2, 4, 8), "frames that a step sees", trains=True),
     Knob("perceptual", True, (False, True), "whether the perceptual loss is trained for", trains=True),
     Knob("adversarial", True, (False, True), "whether a discriminator learns along", trains=True),

@@ -64,10 +64,25 @@ def held_out(views: TrainingSet, share: float, most: int) -> tuple[list[int], li
             f"a network learns from one frame and is judged by another, but there are {len(views)}: "
             "ask for more `views` or `training_rooms` in the track's preset"
         )
-    of_frame = views.frames["room"].tolist() if len(views.rooms) > 1 else list(range(len(views)))
+    of_frame = _groups(views)
     kinds = sorted(set(of_frame))
     apart = set(kinds[-max(1, round(share * len(kinds))) :])
     learned = [number for number, kind in enumerate(of_frame) if kind not in apart]
     others = [number for number, kind in enumerate(of_frame) if kind in apart]
     count = min(most, len(others))
     return learned, [others[k * len(others) // count] for k in range(count)]
+
+
+def share_of(views: TrainingSet, numbers: Sequence[int], share: float) -> list[int]:
+    """Those frames that are a share of some, one at least, spread evenly: whole rooms where there are several."""
+    of_frame = _groups(views)
+    groups = sorted({of_frame[number] for number in numbers})
+    count = max(1, round(share * len(groups)))
+    kept = {groups[k * len(groups) // count] for k in range(count)}
+    return [number for number in numbers if of_frame[number] in kept]
+
+
+def _groups(views: TrainingSet) -> list[int]:
+    """Of each frame what is held out or left out as one: its room, or where there is but one the frame."""
+    rooms: list[int] = views.frames["room"].tolist()
+    return rooms if len(views.rooms) > 1 else list(range(len(views)))

@@ -11,7 +11,7 @@ from gibench.baselines.direct_light.tracer import DirectLight
 from gibench.baselines.image_to_image.camera_space import in_camera_space
 from gibench.baselines.image_to_image.device_frames import DeviceFrames, channels_first
 from gibench.baselines.image_to_image.examples import READ, Examples
-from gibench.baselines.image_to_image.frames import Frames, held_out
+from gibench.baselines.image_to_image.frames import Frames, held_out, share_of
 from gibench.baselines.image_to_image.learner import EPOCHS, IndirectLight, TrainingPlan
 from gibench.baselines.image_to_image.shading import CHANNELS, geometry, indirect
 from gibench.baselines.method import MethodError, Prediction, Setting, Site, Training, View, reading
@@ -52,6 +52,7 @@ class IndirectByNetwork(DirectLight):
         """Learn indirect light from the rooms that are not held out."""
         views = training.views
         learned, apart = held_out(views, HELD_OUT, MOST_HELD_OUT)
+        learned = share_of(views, learned, float(self.settings["images"]))
         plan = TrainingPlan.of(self.settings, training.seed)
         with seeded(plan.seed):
             network = self.network().to(torch_device())

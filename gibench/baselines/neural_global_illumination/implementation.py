@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import torch
 
-from gibench.baselines.image_to_image.frames import Frames, held_out
+from gibench.baselines.image_to_image.frames import Frames, held_out, share_of
 from gibench.baselines.linearly_transformed_cosines.implementation import area_light
 from gibench.baselines.method import MethodError, Prediction, Setting, Site, Training, View, reading
 from gibench.baselines.moving_light.lit_frames import LitFrames
@@ -43,8 +43,7 @@ class NeuralLight:
         """Learn the room. Returns seconds that were spent before."""
         views = training.views
         learned, judged = held_out(views, HELD_OUT, JUDGED)
-        count = max(1, round(float(self.settings["images"]) * len(learned)))
-        learned = [learned[k * len(learned) // count] for k in range(count)]
+        learned = share_of(views, learned, float(self.settings["images"]))
         frames = Frames(views, METHOD.channels, learned)
         measure = measured(frames)
         plan = TrainingPlan.of(self.settings, training.seed, training.seconds)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from gibench.benchmarks.report.error_against_cost import COSTS, error_against
+from gibench.benchmarks.report.error_against_settings import error_against_settings
 from gibench.benchmarks.report.error_against_training import error_against_training
 from gibench.benchmarks.report.error_along_path import error_along_path
 from gibench.benchmarks.report.plot_style import STYLE, save
@@ -41,6 +42,12 @@ def _written(source: ReportSource, summary: Summary, out: Path) -> list[Path]:
                             name = f"{prefix}error-against-{cost.name}-{part}-{metric}"
                             several = len(machines) > 1
                             written += save(figure, out, f"{name}-machine-{order + 1}" if several else name)
+                for order, machine in enumerate(summary.machines):
+                    figure = error_against_settings(summary, track, part, metric, machine)
+                    if figure is not None:
+                        name = f"{prefix}error-against-settings-{part}-{metric}"
+                        several = len(summary.machines) > 1
+                        written += save(figure, out, f"{name}-machine-{order + 1}" if several else name)
                 figure = error_along_path(summary, track, part, metric)
                 if figure is not None:
                     written += save(figure, out, f"{prefix}error-along-path-{part}-{metric}")

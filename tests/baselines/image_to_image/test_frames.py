@@ -12,7 +12,7 @@ import torch
 
 from gibench.baselines.image_to_image.camera_space import in_camera_space, mirrored
 from gibench.baselines.image_to_image.device_frames import DeviceFrames, as_image
-from gibench.baselines.image_to_image.frames import Frames, held_out
+from gibench.baselines.image_to_image.frames import Frames, held_out, share_of
 from gibench.baselines.training.errors import TrainingError
 from gibench.baselines.training_set import TrainingSet, training_set
 from gibench.datasets import exr
@@ -123,6 +123,15 @@ def test_rooms_are_held_out_whole(views):
     assert held_out(views, 0.5, 8) == ([0, 1], [2, 3])
     with pytest.raises(TrainingError, match="there are 0: ask for more"):
         held_out(TrainingSet(), 0.1, 8)
+
+
+def test_a_share_is_of_whole_rooms(views):
+    rooms = TrainingSet(Dataset(Path(), {}, pd.DataFrame({"room": [1, 1, 2, 2, 5, 5, 7, 7]})))
+    assert share_of(rooms, [0, 1, 2, 3, 4, 5], 1) == [0, 1, 2, 3, 4, 5]
+    assert share_of(rooms, list(range(8)), 0.5) == [0, 1, 4, 5]
+    assert share_of(rooms, [2, 3, 4, 5, 6, 7], 0.33) == [2, 3]
+    assert share_of(rooms, [0, 1, 2, 3, 4, 5], 0.01) == [0, 1]
+    assert share_of(views, [0, 1, 2, 3], 0.5) == [0, 2]
 
 
 def test_images_of_lanes_are_means_of_their_cells():

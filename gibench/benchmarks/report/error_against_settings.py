@@ -1,0 +1,176 @@
+"""The plot of error against a setting: wavelets, samples, training images or rooms. Is more of it worth its cost?"""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gibench.benchmarks.report.figures import (
+    WIDTH,
+    end_labels,
+    error_axis,
+    new_figure,
+    new_panel,
+    noise_band,
+    short,
+    widest,
+    write_title,
+)
+from gibench.benchmarks.report.plot_style import LINES, look, tick_text
+from gibench.benchmarks.report.runs import part_title
+from gibench.benchmarks.report.summary import Summary
+from gibench.benchmarks.report.wording import metric_title, printable
+from gibench.metrics import METRICS
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+LEAST = 3
+"""Values of a setting that make a line."""
+
+COLUMNS = 2
+PANEL = 1.7
+"""Inches, the height of a panel."""
+
+MOST_TICKS = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """A method at LEAST values or more of one numeric knob, all else equal.
+
+    lines: rows of the settings with `value` of the knob, mean, low, high and floor, by what else is set.
+    """
+
+    method: str
+    knob: str
+    lines: dict[str, pd.DataFrame]
+
+    @property
+    def values(self) -> list[float]:
+        """All that the knob takes, smallest first."""
+        return sorted({float(value) for rows in self.lines.values() for value in rows["value"]})
+
+
+def sweeps(summary: Summary, track: str, part: str, metric: str, machine: str) -> list[Sweep]:
+    """Find what was turned: a sweep for each method and knob."""
+    entries = summary.entries
+    entries = entries[(entries["track"] == track) & (entries["machine"] == machine)]
+    scores = summary.scores[(summary.scores["part"] == part) & (summary.scores["metric"] == metric)]
+    scored = entries[["method", "label", "knobs"]].merge(scores, left_index=True, right_on="entry")
+    scored = scored[np.isfinite(scored["mean"])]
+    scored[["low", "high"]] = scored[["low", "high"]].replace([-np.inf, np.inf], np.nan)
+    found = []
+    for method, own in scored.groupby("method", sort=False):
+        knobs = [json.loads(text) for text in own["knobs"]]
+        for knob in dict.fromkeys(name for setting in knobs for name in setting):
+            lines: dict[str, pd.DataFrame] = {}
+            values = [_number(setting.get(knob)) for setting in knobs]
+            others = [
+                json.dumps({k: v for k, v in setting.items() if k != knob}, sort_keys=True)
+                for setting in knobs
+            ]
+            rows = own.assign(value=values, others=others).dropna(subset="value").sort_values("value")
+            for _, line in rows.groupby("others", sort=False):
+                if line["value"].nunique() >= LEAST:
+                    label = str(line["label"].iloc[0]).split()
+                    lines[" ".join(word for word in label if not word.startswith(f"{knob}="))] = line
+            if lines:
+                found.append(Sweep(str(method), knob, lines))
+    return found
+
+
+def error_against_settings(
+    summary: Summary, track: str, part: str, metric: str, machine: str
+) -> Figure | None:
+    """Plot error against each knob that was turned, a panel each, under one scale of error. None where none was."""
+    found = sweeps(summary, track, part, metric, machine)
+    if not found:
+        return None
+    import pandas as pd
+
+    everything = pd.concat([rows for sweep in found for rows in sweep.lines.values()])
+    higher = METRICS[metric].direction == "higher"
+    logarithmic = not higher and bool((everything["mean"] > 0).all())
+    rows = math.ceil(len(found) / COLUMNS)
+    top, bottom, gap, left, between = 0.78, 0.42, 0.62, 0.72, 0.3
+    height = top + rows * PANEL + (rows - 1) * gap + bottom
+    figure, first = new_figure(WIDTH, height)
+    first.remove()
+    about = f"{part_title(part)}  ·  track {short(track)}  ·  95 % intervals  ·  {short(machine)}"
+    write_title(figure, f"{metric_title(metric)} against settings", about)
+    named = [short(name) for sweep in found if len(sweep.lines) > 1 for name in sweep.lines]
+    beside = min(widest(figure, named) + 0.3, WIDTH / 4) if named else 0.1
+    width = (WIDTH - left - between - 0.1) / COLUMNS
+    methods = list(summary.entries["method"].unique())
+    for number, sweep in enumerate(found):
+        row, column = divmod(number, COLUMNS)
+        place = (
+            left + column * (width + between),
+            height - top - PANEL - row * (PANEL + gap),
+            width - beside,
+            PANEL,
+        )
+        axes = new_panel(figure, place)
+        floors = everything["floor"]
+        error_axis(axes, everything["low"], everything["high"], everything["mean"], floors, logarithmic)
+        noise_band(axes, float(floors.mean()), higher)
+        _values(axes, sweep.values)
+        axes.set_title(short(sweep.method), size=8, pad=3, loc="left")
+        axes.set_xlabel(printable(sweep.knob))
+        if column:
+            axes.set_yticklabels([])
+        else:
+            axes.set_ylabel(f"{metric_title(metric)}, {'higher' if higher else 'lower'} is better")
+        style = look(methods.index(sweep.method))
+        ends = []
+        for (name, line), dashes in zip(sweep.lines.items(), LINES * len(sweep.lines), strict=False):
+            _line(axes, line, style, dashes)
+            ends.append((short(name), float(line["mean"].iloc[-1]), style["color"]))
+        if len(ends) > 1:
+            end_labels(figure, axes, ends)
+    return figure
+
+
+def _number(value: Any) -> float:
+    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else math.nan
+
+
+def _values(axes: Axes, values: list[float]) -> None:
+    """Lay out the axis of a knob, with ticks at the values that it took."""
+    from matplotlib.ticker import FixedFormatter, FixedLocator, NullLocator
+
+    if values[0] > 0:
+        axes.set_xscale("log")
+        pad = (values[-1] / values[0]) ** 0.06
+        axes.set_xlim(values[0] / pad, values[-1] * pad)
+    else:
+        pad = 0.06 * (values[-1] - values[0])
+        axes.set_xlim(values[0] - pad, values[-1] + pad)
+    ticks = values[:: math.ceil(len(values) / MOST_TICKS)]
+    axes.xaxis.set_major_locator(FixedLocator(ticks))
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.xaxis.set_major_formatter(FixedFormatter([tick_text(value) for value in ticks]))
+
+
+def _line(axes: Axes, line: pd.DataFrame, style: dict[str, Any], dashes: Any) -> None:
+    across, up = line["value"].to_numpy(float), line["mean"].to_numpy(float)
+    spans = np.abs(np.stack([line["low"], line["high"]]) - up)
+    colour = style["color"]
+    axes.errorbar(across, up, yerr=spans, fmt="none", ecolor=colour, elinewidth=0.9, capsize=1.8, zorder=3)
+    axes.plot(
+        across,
+        up,
+        color=colour,
+        linewidth=1.1,
+        linestyle=dashes,
+        marker=style["marker"],
+        markersize=4,
+        zorder=4,
+    )
