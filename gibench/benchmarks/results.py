@@ -124,6 +124,23 @@ class Results:
         return pd.DataFrame(rows, columns=["result", "stage", "ms_median", "ms_p95"])
 
     @cached_property
+    def extras(self) -> pd.DataFrame:
+        """A row a number that a method says of a frame beside its image: result, frame, name, value.
+
+        NaN where the method had no number.
+        """
+        import pandas as pd
+
+        rows = [
+            (id, number, name, float("nan") if value is None else value)
+            for id, record in self._good()
+            for number, frame in enumerate(record["frames"])
+            for name, value in frame.get("extra", {}).items()
+        ]
+        columns = {"result": "str", "frame": "int64", "name": "str", "value": "float64"}
+        return pd.DataFrame(rows, columns=list(columns)).astype(columns)
+
+    @cached_property
     def curves(self) -> pd.DataFrame:
         """A row a look at the held-out error of a training: result, training, step, seconds, error.
 

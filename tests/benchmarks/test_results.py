@@ -36,6 +36,18 @@ def test_tables_are_tidy(results):
     assert results.skipped == {}
 
 
+def test_extras_are_what_methods_say_of_their_frames(results):
+    extras = results.extras
+    assert list(extras.columns) == ["result", "frame", "name", "value"]
+    assert set(extras["name"]) == {"process", "odds"}
+    assert extras.loc[extras["name"] == "odds", "value"].isna().all()
+    processes = extras[extras["name"] == "process"]
+    assert set(processes["result"]) == set(results.results["result"])
+    for id, own in processes.groupby("result"):
+        said = [frame["extra"]["process"] for frame in results.record(id)["frames"]]
+        assert own.sort_values("frame")["value"].tolist() == said
+
+
 def test_times_are_those_of_the_frames(results):
     merged = results.times.merge(results.results, on="result")
     for _, group in merged.groupby("result"):

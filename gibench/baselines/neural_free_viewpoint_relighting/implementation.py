@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import ClassVar, cast
+from typing import Any, ClassVar, cast
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 
-from gibench.baselines.method import Method, Setting
+from gibench.baselines.method import Method, Setting, View
 from gibench.baselines.neural_free_viewpoint_relighting import METHOD
 from gibench.baselines.neural_free_viewpoint_relighting.network import HashField, Size, TransportNetwork
 from gibench.baselines.neural_free_viewpoint_relighting.training import STEPS, TrainingPlan, WaveletTransport
 from gibench.baselines.relighting.examples import Examples, Light
 from gibench.baselines.relighting.implementation import RelitByNetwork
 from gibench.baselines.wavelets.light import chosen_light, coefficients_of
-from gibench.baselines.wavelets.selection import Weighting
+from gibench.baselines.wavelets.selection import Weighting, energy_kept, replaced
 from gibench.rendering.backend import torch_device
 from gibench.rendering.lighting import EnvironmentMap
 
@@ -31,6 +32,7 @@ class NeuralRelighting(RelitByNetwork):
         """Take other settings that do not train."""
         super().adjust(settings)
         self._wavelets = int(settings["wavelets"])
+        self._places = self._before = np.zeros(0, dtype=np.int64)
         self._selection = cast("Weighting", settings["selection"])
 
     def field(self, size: Size) -> nn.Module:
@@ -53,7 +55,18 @@ class NeuralRelighting(RelitByNetwork):
     def told(self, light: Light) -> tuple[Tensor, Tensor]:
         """Places and weights of the wavelets that matter most."""
         places, weights = chosen_light(light, self._wavelets, self._selection)
+        self._energy = energy_kept(light, places)
+        self._before, self._places = self._places, places
         return torch.from_numpy(places).to(torch_device()), torch.from_numpy(weights).to(torch_device())
+
+    def numbers(self, view: View, told: Any) -> dict[str, float]:
+        """`energy`: share of the environment's that the chosen wavelets hold. `replaced`: share of them that the frame
+        before had not, where there is one.
+        """
+        found = {"energy": self._energy}
+        if view.previous is not None:
+            found["replaced"] = replaced(self._places, self._before)
+        return found
 
     def radiance(self, points: Tensor, material: Tensor, told: tuple[Tensor, Tensor]) -> Tensor:
         """The dot product of light and transport."""

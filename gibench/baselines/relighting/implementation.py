@@ -81,6 +81,10 @@ class RelitByNetwork(DirectLight):
     def told(self, light: Light) -> Any:
         """What the network is told of light, once a frame."""
 
+    def numbers(self, view: View, told: Any) -> dict[str, float]:
+        """What is worth a column of the light that a frame was told of."""
+        return {}
+
     @abstractmethod
     def radiance(self, points: Tensor, material: Tensor, told: Any) -> Tensor:
         """Indirect radiance (N, 3), signed, of surfaces at points (N, 3) of the unit cube, material (N, 13)."""
@@ -143,10 +147,13 @@ class RelitByNetwork(DirectLight):
             if self._last is None or self._last[0] != environment:
                 self._last = environment, self.light_of(environment)
             told = self.told(self._last[1])
+            extra = self.numbers(view, told)
         with stages.stage("inference"), torch.inference_mode():
             indirect = self.indirect(images, view, told)
         with stages.stage("denoising"):
-            return self._finished(np.asarray(direct), indirect, [np.asarray(guide) for guide in guides])
+            return self._finished(
+                np.asarray(direct), indirect, [np.asarray(guide) for guide in guides], extra
+            )
 
     def indirect(self, images: Images, view: View, told: Any) -> Tensor:
         """Indirect radiance (H, W, 3), ≥ 0, on the device; 0 where no surface is seen."""
@@ -157,11 +164,18 @@ class RelitByNetwork(DirectLight):
         image[seen] = found.clamp(min=0)
         return image
 
-    def _finished(self, direct: NDArray[Any], indirect: Tensor, guides: Sequence[NDArray[Any]]) -> Prediction:
+    def _finished(
+        self,
+        direct: NDArray[Any],
+        indirect: Tensor,
+        guides: Sequence[NDArray[Any]],
+        extra: Mapping[str, float],
+    ) -> Prediction:
         """Denoise direct light, or all of the light and, where it is scored, indirect light once more."""
         made = indirect.cpu().numpy()
         albedo, normal = guides
         clean = partial(denoise, albedo=albedo, normal=normal)
         if not self._denoise:
-            return Prediction(clean(direct) + made, indirect=made)
-        return Prediction(clean(direct + made), indirect=clean(made) if "indirect" in self._scored else None)
+            return Prediction(clean(direct) + made, indirect=made, extra=extra)
+        scored = clean(made) if "indirect" in self._scored else None
+        return Prediction(clean(direct + made), indirect=scored, extra=extra)

@@ -43,6 +43,14 @@ def energy_kept(coefficients: NDArray[np.floating], places: NDArray[np.int64]) -
     return float(energy[places].sum()) / total if total > 0 else 1.0
 
 
+def replaced(places: NDArray[np.int64], before: NDArray[np.int64]) -> float:
+    """Share of the chosen wavelets that were not chosen before, in [0, 1]; 0 where none is chosen.
+
+    A frame after the other under a light that turns, this is how much the selection flickers.
+    """
+    return float(np.isin(places, before, invert=True).mean()) if len(places) else 0.0
+
+
 def only(coefficients: NDArray[np.floating], places: NDArray[np.int64]) -> NDArray[np.floating]:
     """The coefficients (…, S, S, C) with zeros but for some places."""
     flat = coefficients.reshape(-1, coefficients.shape[-1])

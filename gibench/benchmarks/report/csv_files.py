@@ -22,7 +22,7 @@ _LOOK = ["training", "step", "seconds", "error"]
 
 
 def write_csv_files(source: ReportSource, summary: Summary, out: Path) -> list[Path]:
-    """Write leaderboard.csv, frames.csv, sequences.csv, stages.csv, training.csv and results.csv into a folder.
+    """Write leaderboard.csv, frames.csv, sequences.csv, stages.csv, training.csv, extras.csv and results.csv.
 
     Times are milliseconds where a name ends in _ms or begins with ms, seconds where it ends in _s or is
     seconds; memory is MB.
@@ -37,6 +37,7 @@ def write_csv_files(source: ReportSource, summary: Summary, out: Path) -> list[P
         "sequences.csv": source.sequences.merge(of, on="result")[[*_WHO, "part", "metric", "value"]],
         "stages.csv": source.stages.merge(of, on="result")[[*_WHO, "stage", "ms_median", "ms_p95"]],
         "training.csv": source.curves.merge(of, on="result")[[*_WHO, *_LOOK]],
+        "extras.csv": source.extras.merge(of, on="result")[[*_WHO, "frame", "name", "value"]],
         "results.csv": summary.results.drop(columns="entry"),
     }
     for name, table in tables.items():

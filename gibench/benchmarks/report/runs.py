@@ -106,6 +106,11 @@ class Runs:
         return self._joined("stages").drop_duplicates(["result", "stage"], ignore_index=True)
 
     @cached_property
+    def extras(self) -> pd.DataFrame:
+        """As `Results.extras`."""
+        return self._joined("extras").drop_duplicates(["result", "frame", "name"], ignore_index=True)
+
+    @cached_property
     def curves(self) -> pd.DataFrame:
         """As `Results.curves`."""
         return self._joined("curves").drop_duplicates(ignore_index=True)

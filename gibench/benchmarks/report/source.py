@@ -31,7 +31,8 @@ class ReportSource(Protocol):
     run: track, preset, seed, machine (a mapping), created, unbiased (metrics against the truth). results: a row a
     result, that is (scene, method, knobs, seed). stages: milliseconds per frame by result and stage. frames: metric
     values by result, frame and part. sequences: values of metrics in time by result and part. floor: what each
-    metric says of a second, independent reference, by scene, frame and part. curves: looks at the held-out error of
+    metric says of a second, independent reference, by scene, frame and part. extras: numbers that methods say of their
+    frames. curves: looks at the held-out error of
     trainings, a row a look. paths: which frames of a scene follow each other.
     """
 
@@ -62,6 +63,10 @@ class ReportSource(Protocol):
     @property
     def floor(self) -> pd.DataFrame:
         """Columns scene, frame, metric, part, value."""
+
+    @property
+    def extras(self) -> pd.DataFrame:
+        """Columns result, frame, name, value."""
 
     @property
     def curves(self) -> pd.DataFrame:

@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from gibench.baselines.wavelets.haar import WaveletError, haar, inverse_haar, supports
-from gibench.baselines.wavelets.selection import energy_kept, largest, only
+from gibench.baselines.wavelets.selection import energy_kept, largest, only, replaced
 from gibench.generators.environments.files import environment_files, read_environment
 from gibench.rendering.cubemap import to_cubemap
 
@@ -108,3 +108,11 @@ def test_few_wavelets_keep_most_of_real_light():
         kept[place] = np.mean(shares)
     assert 0.7 < kept["indoor"] < 0.9
     assert 0.9 < kept["outdoor"] < 1.0
+
+
+def test_the_share_of_wavelets_that_are_new():
+    before = np.array([7, 1, 4, 2])
+    assert replaced(np.array([2, 7, 4, 1]), before) == 0
+    assert replaced(np.array([2, 7, 5, 3]), before) == 0.5
+    assert replaced(before, np.zeros(0, dtype=np.int64)) == 1
+    assert replaced(np.zeros(0, dtype=np.int64), before) == 0

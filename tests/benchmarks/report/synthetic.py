@@ -220,6 +220,11 @@ class SyntheticRun:
         return pd.DataFrame(rows, columns=["result", "sequence", "metric", "part", "value"])
 
     @cached_property
+    def extras(self):
+        rows = [(row.result, frame, "lit", 0.25) for row in self.done for frame in self.indices]
+        return pd.DataFrame(rows, columns=["result", "frame", "name", "value"])
+
+    @cached_property
     def curves(self):
         rows = []
         for number, row in enumerate(self.done):

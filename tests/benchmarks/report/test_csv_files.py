@@ -13,7 +13,7 @@ def tables(run, summary, tmp_path_factory):
 
 
 def test_every_file_names_the_method_and_setting(tables):
-    names = ("leaderboard", "frames", "sequences", "stages", "training", "results")
+    names = ("leaderboard", "frames", "sequences", "stages", "training", "extras", "results")
     assert set(tables) == {f"{name}.csv" for name in names}
     for table in tables.values():
         assert {"method", "label", "knobs", "machine"} <= set(table.columns)
@@ -37,6 +37,13 @@ def test_frames_carry_every_value_and_the_noise_floor(run, tables):
     assert len(both) == len(run.frames)
     assert both["value"].to_numpy() == pytest.approx(both["value_raw"].to_numpy(), rel=1e-6)
     assert (frames.loc[frames["metric"] == "rmse", "noise_floor"] == 0.004).all()
+
+
+def test_extras_carry_what_methods_say_of_their_frames(run, tables):
+    extras = tables["extras.csv"]
+    assert list(extras.columns[-3:]) == ["frame", "name", "value"]
+    assert len(extras) == len(run.extras) > 0
+    assert (extras["value"] == 0.25).all()
 
 
 def test_training_carries_every_look(tables, tmp_path):
