@@ -6,6 +6,7 @@ from typing import Any
 
 import mitsuba as mi
 import numpy as np
+import trimesh
 
 from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.light_rig import LightRig
@@ -48,3 +49,15 @@ def strips_rig(*, panoramas: bool = False) -> LightRig:
         "bsdf": wall,
     }
     return LightRig(load_dict({"type": "scene", **parts}), panoramas=panoramas)
+
+
+def strips_parts() -> list[trimesh.Trimesh]:
+    """The same geometry, a mesh a part: floor, wall and box."""
+    floor = trimesh.Trimesh(
+        [[-1.5, -1.5, 0], [1.5, -1.5, 0], [1.5, 1.5, 0], [-1.5, 1.5, 0]], [[0, 1, 2], [0, 2, 3]]
+    )
+    wall = trimesh.Trimesh(
+        [[-1.5, 1.5, 0], [1.5, 1.5, 0], [1.5, 1.5, 2], [-1.5, 1.5, 2]], [[0, 1, 2], [0, 2, 3]]
+    )
+    box = trimesh.creation.box(bounds=[[-0.3, 0.15, 0.0], [0.7, 0.45, 0.5]])
+    return [floor, wall, box]

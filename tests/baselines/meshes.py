@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import trimesh
 
+from gibench.generators.glb import Y_UP
 from tests.rendering import scenes
 
 
@@ -42,6 +43,15 @@ def room(
 def ply(mesh: trimesh.Trimesh, path: Path, bsdf: dict[str, Any], **more: Any) -> dict[str, Any]:
     mesh.export(path)
     return {"type": "ply", "filename": str(path), "bsdf": bsdf, **more}
+
+
+def write_glb(folder: Path, parts: list[trimesh.Trimesh]) -> None:
+    """The room.glb of a folder, of parts in world space with Z up."""
+    scene = trimesh.Scene()
+    turn = trimesh.transformations.quaternion_matrix([Y_UP[3], *Y_UP[:3]])
+    for part in parts:
+        scene.add_geometry(part, transform=turn)
+    scene.export(folder / "room.glb")
 
 
 def directions(count: int, seed: int = 0) -> Any:

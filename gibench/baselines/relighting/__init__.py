@@ -1,11 +1,11 @@
-"""What the methods share that relight a scene: direct light, path traced, and indirect light by a network."""
+"""What the methods share that relight a scene: direct light, path traced, and indirect light surface by surface."""
 
 from __future__ import annotations
 
 from gibench.baselines.method import Knob
 
 SURFACE = ("position", "normal", "albedo", "specular_albedo", "roughness")
-"""Channels of what is seen, that networks are given."""
+"""Channels of what is seen, that indirect light is worked out from."""
 
 CHANNELS = ("indirect_diffuse", "indirect_specular", *SURFACE)
 """Of a training frame."""

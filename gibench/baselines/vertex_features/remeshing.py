@@ -63,17 +63,18 @@ def meshes_of(folder: Path) -> list[trimesh.Trimesh]:
     return found
 
 
-def even_mesh(parts: Iterable[trimesh.Trimesh], box: Box, edge: float) -> Mesh:
+def even_mesh(parts: Iterable[trimesh.Trimesh], box: Box, edge: float, *, most: int | None = None) -> Mesh:
     """One mesh of all parts, as far as they lie in the box. edge: metres along a side of its triangles.
 
-    Raises RemeshingError where there is no surface.
+    most: vertices, as the area and the length of an edge say; MOST_VERTICES by default. Raises RemeshingError where
+    there is no surface.
     """
     inside = [cut for part in parts if (cut := _cut(part, box)) is not None]
     area = sum(float(part.area) for part in inside)
     if not inside or area <= SMALLEST:
         raise RemeshingError("nothing of the scene's meshes lies in what the training frames see")
     # An even mesh has one vertex for each √3/2 of a squared edge.
-    edge = max(edge, math.sqrt(2 * area / (math.sqrt(3) * MOST_VERTICES)))
+    edge = max(edge, math.sqrt(2 * area / (math.sqrt(3) * min(most or MOST_VERTICES, MOST_VERTICES))))
     vertices, triangles, count = [], [], 0
     for mesh in (_remeshed(part, edge) for part in inside):
         vertices.append(mesh.vertices)

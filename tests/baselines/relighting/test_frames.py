@@ -13,6 +13,7 @@ import trimesh
 from gibench.baselines.method import MethodError, View
 from gibench.baselines.neural_free_viewpoint_relighting import METHOD as NFVR
 from gibench.baselines.neural_precomputed_radiance_transfer import METHOD as NPRT
+from gibench.baselines.precomputed_radiance_transfer import METHOD as HARMONICS
 from gibench.baselines.relighting.surfaces import Box
 from gibench.baselines.stages import Stages
 from gibench.baselines.training.artifacts import WEIGHTS
@@ -22,7 +23,8 @@ from gibench.baselines.vertex_features.implementation import MESH
 from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.lighting import EnvironmentMap, Lighting, Shot
 from gibench.rendering.panoramas import HEIGHT, Panorama
-from tests.baselines.material_strips import CAMERA, strips_rig
+from tests.baselines.material_strips import CAMERA, strips_parts, strips_rig
+from tests.baselines.meshes import write_glb
 from tests.baselines.sites import site
 
 RESOLUTION = (40, 32)
@@ -32,6 +34,7 @@ METHODS = {
     "vertex-features": (VERTICES, {"network": "small", "faces": 16}),
     "nprt": (NPRT, {}),
     "nprt:one-branch": (NPRT, {"separated": False}),
+    "sh-prt": (HARMONICS, {"edge": 0.2, "reflected": 4, "paths": 64}),
 }
 """Cards, and settings of small networks."""
 
@@ -53,15 +56,19 @@ def running(name, **settings):
 
 
 def prepared(name, rig, folder, **settings):
-    """The method after a training of no step."""
+    """The method after a training of no step, if it trains."""
     made = running(name, **settings)
+    parts = ("full", "indirect")
+    if not made.method.trains:
+        write_glb(folder, strips_parts())
+        made.prepare(dataclasses.replace(site(rig.scene, folder), rig=rig, parts=parts))
+        return made
     box = Box((-1.5, -1.5, 0.0), (3.0, 3.0, 2.0))
     mesh = trimesh.creation.box((3, 3, 2))
     np.savez(folder / MESH, vertices=mesh.vertices, triangles=mesh.faces)
     made.surveyed(folder, box)
     weights = {"network": made.untrained(0).state_dict()}
     write_tensors(folder / WEIGHTS, {"weights": weights, "facts": box.facts()})
-    parts = ("full", "indirect")
     made.prepare(dataclasses.replace(site(rig.scene, folder), weights=folder, rig=rig, parts=parts))
     return made
 
@@ -79,7 +86,7 @@ def frame(rig, method, light, resolution=RESOLUTION, camera=CAMERA):
     rig.set(lighting)
     stages = Stages()
     found = method.render(View(Shot(camera, lighting), None, resolution, 0, 0), stages)
-    assert {"ray casting", "g-buffer", "light", "inference", "denoising"} == set(stages.seconds)
+    assert {"ray casting", "g-buffer", "light", method.stage, "denoising"} == set(stages.seconds)
     for image in (found.color, found.indirect):
         assert image.shape == (resolution[1], resolution[0], 3)
         assert np.isfinite(image).all()
@@ -169,13 +176,18 @@ def test_denoising_changes_indirect_light_too(rig, method):
 
 def test_networks_that_are_not_there_or_damaged_and_other_light_are_named(rig, method, tmp_path):
     name = method.method.id
+    if method.method.trains:
+        check_trained(rig, name, tmp_path)
+    with pytest.raises(
+        MethodError, match=f"{name} is for frames under an environment .* run it on the track relight"
+    ):
+        method.render(View(Shot(CAMERA), None, RESOLUTION, 0, 0), Stages())
+
+
+def check_trained(rig, name, tmp_path):
     bare = dataclasses.replace(site(rig.scene, tmp_path), rig=rig)
     with pytest.raises(MethodError, match=f"{name} has not been trained"):
         running(name).prepare(bare)
     (tmp_path / WEIGHTS).write_bytes(b"nothing")
     with pytest.raises(MethodError, match=r"cannot be read .* remove that folder"):
         running(name).prepare(dataclasses.replace(bare, weights=tmp_path))
-    with pytest.raises(
-        MethodError, match=f"{name} is for frames under an environment .* run it on the track relight"
-    ):
-        method.render(View(Shot(CAMERA), None, RESOLUTION, 0, 0), Stages())

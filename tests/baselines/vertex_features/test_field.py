@@ -9,7 +9,8 @@ import trimesh
 
 from gibench.baselines.neural_free_viewpoint_relighting.network import SMALL, TransportNetwork
 from gibench.baselines.relighting.surfaces import Box
-from gibench.baselines.vertex_features.field import ClosestTriangles, VertexField
+from gibench.baselines.vertex_features.closest import ClosestTriangles
+from gibench.baselines.vertex_features.field import VertexField
 from gibench.baselines.vertex_features.remeshing import Mesh, even_mesh
 
 BOX = Box((-1.0, -1.0, -1.0), (2.0, 2.0, 4.0))

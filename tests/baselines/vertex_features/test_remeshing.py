@@ -9,7 +9,7 @@ import trimesh
 from gibench.baselines.relighting.surfaces import Box
 from gibench.baselines.vertex_features import remeshing
 from gibench.baselines.vertex_features.remeshing import RemeshingError, even_mesh, meshes_of
-from gibench.generators.glb import Y_UP
+from tests.baselines.meshes import write_glb
 
 ROOM = Box((-5.0, -5.0, -5.0), (10.0, 10.0, 10.0))
 
@@ -93,12 +93,9 @@ def test_memory_is_bounded(monkeypatch):
 
 
 def test_a_glb_comes_back_with_z_up(tmp_path):
-    scene = trimesh.Scene()
     part = trimesh.creation.box((1, 2, 3))
     part.apply_translation([0, 5, 1.5])
-    turn = trimesh.transformations.quaternion_matrix([Y_UP[3], *Y_UP[:3]])
-    scene.add_geometry(part, transform=turn)
-    scene.export(tmp_path / "room.glb")
+    write_glb(tmp_path, [part])
     (found,) = meshes_of(tmp_path)
     np.testing.assert_allclose(found.bounds, part.bounds, atol=1e-6)
     with pytest.raises(RemeshingError, match="cannot be read"):
