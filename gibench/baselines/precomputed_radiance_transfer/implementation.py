@@ -95,7 +95,7 @@ class HarmonicTransfer(Relit):
         return self._arrived
 
     def numbers(self, view: View, told: Arrived) -> dict[str, float]:
-        """How much ringing there is: shares of negative light in the environment, as it was taken and without a window."""
+        """How much ringing there is: shares of negative light in the environment, as taken and without a window."""
         return dict(self._rings)
 
     def sent(self, pixels: Pixels, told: Arrived) -> Tensor:
