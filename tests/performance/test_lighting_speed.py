@@ -1,8 +1,9 @@
-"""What a light costs: moves and swaps in a furnished room, and frames that each have another light."""
+"""What a light costs: moves and swaps in a furnished room, frames that each have another light, a thousand cameras."""
 
 from __future__ import annotations
 
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,8 @@ from gibench.generators.shots import shot_of
 from gibench.rendering.lighting import AreaLight, EnvironmentMap, Lighting
 from gibench.rendering.panoramas import Panorama
 from gibench.rendering.render import render_frame
+from gibench.rendering.scene import load_scene
+from tests.performance.turns import seconds
 
 pytestmark = pytest.mark.performance
 
@@ -104,3 +107,24 @@ def test_frames_with_another_light_each_cost_little_beside_their_kernels(loaded,
         f"kernels ({np.median(kernels[2:]):.2f} s a frame)"
     )
     assert np.median(ratios[2:]) <= 1.15
+
+
+def test_cameras_of_the_file_cost_frames_nothing(tmp_path):
+    """Rooms of presets whose light moves have a camera for each of a thousand views."""
+    recipe = check_recipe({"kinds": ["living"], "views": 2})
+    room = sampled_room(recipe, 0)
+    written_room(room, tmp_path, recipe)
+    file = tmp_path / "scene.xml"
+    text = file.read_text()
+    start, end = text.index("<sensor"), text.index("</sensor>") + len("</sensor>")
+    sensor = text[start:end]
+    cameras = "".join(sensor.replace('"camera.0"', f'"camera.{number}"') for number in range(1000))
+    file.with_name("many.xml").write_text(f"{text[:start]}{cameras}</scene>")
+    few, many = (load_scene(one, share_kernels=True) for one in (file, file.with_name("many.xml")))
+
+    def frame(scene):
+        render_frame(scene, shot_of(room, 0).camera, resolution=(8, 8), spp=1, channels=["color"])
+
+    ours, other = seconds(partial(frame, few), partial(frame, many))
+    print(f"\na small frame: {1e3 * ours:.0f} ms, of a file of a thousand cameras {1e3 * other:.0f} ms")
+    assert other < 1.5 * ours
