@@ -101,8 +101,6 @@ class HarmonicTransfer(Relit):
     def sent(self, pixels: Pixels, told: Arrived) -> Tensor:
         """Both lobes' share of what arrives at the surfaces, interpolated between vertices."""
         found = pixels.places.new_zeros(len(pixels.places), 3)
-        if not len(self.transfer.matrices):
-            return found
         for first in range(0, len(found), PIXELS):
             part = slice(first, first + PIXELS)
             found[part] = self._sent(pixels.places[part], pixels.material[part], told)

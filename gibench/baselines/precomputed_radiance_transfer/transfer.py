@@ -70,7 +70,8 @@ class Transfer:
     """Matrices of the vertices of a mesh where light arrives.
 
     sides: of the mesh. edge: metres. row: (2·V,) of each vertex; that of its closest neighbour where none arrives at
-    it. matrices: (R, count of `reflected`, 3, 81) float16, by what arrives, colour and light; `reflected` ≤ 8.
+    it. matrices: (R, count of `reflected`, 3, 81) float16, by what arrives, colour and light; `reflected` ≤ 8. Where no
+    light arrives anywhere there is one, of zeros.
     """
 
     sides: Sides
@@ -107,7 +108,7 @@ def made(
         if len(vertices) <= most:
             break
         edge *= LONGER * math.sqrt(len(vertices) / most)
-    matrices = np.zeros((len(vertices), count(reflected), 3, count(DEGREE)), np.float16)
+    matrices = np.zeros((max(len(vertices), 1), count(reflected), 3, count(DEGREE)), np.float16)
     step = max(LANES // paths, 1)
     for first in range(0, len(vertices), step):
         matrices[first : first + step] = tracer.matrices(vertices[first : first + step], paths, reflected)
@@ -210,6 +211,6 @@ def read(folder: Path, reflected: int) -> Transfer:
     matrices = np.load(folder / MATRICES, mmap_mode="c", allow_pickle=False)
     if matrices.shape[1:] != (count(reflected), 3, count(DEGREE)) or matrices.dtype != np.float16:
         raise ValueError(f"{MATRICES} has the shape {matrices.shape}")
-    if len(row) != len(mesh.vertices) or (len(matrices) and not 0 <= row.min() <= row.max() < len(matrices)):
+    if len(row) != len(mesh.vertices) or not 0 <= row.min() <= row.max() < len(matrices):
         raise ValueError(f"{MESH} is of another mesh")
     return Transfer(sides, edge, row, matrices)

@@ -12,8 +12,10 @@ import trimesh
 from gibench.baselines.method import MethodError, View
 from gibench.baselines.precomputed_radiance_transfer import METHOD, transfer
 from gibench.baselines.precomputed_radiance_transfer.environment import projected
+from gibench.baselines.relighting.surfaces import Box
 from gibench.baselines.stages import Stages
 from gibench.baselines.training.encodings.spherical_harmonics import spherical_harmonics
+from gibench.baselines.vertex_features.remeshing import meshes_of
 from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.estimate import estimate_radiance
 from gibench.rendering.latlong import directions
@@ -45,17 +47,22 @@ def panorama(pixels):
     return Lighting(environment=EnvironmentMap(Panorama.of("made", np.asarray(pixels, np.float32))))
 
 
-@pytest.fixture(scope="module")
-def rig():
+def corner(folder):
+    """A site of the matt corner."""
     parts = {name: slab(low, high, diffuse(*color)) for name, (low, high, color) in PARTS.items()}
-    return LightRig(load_dict({"type": "scene", **parts}))
-
-
-@pytest.fixture(scope="module")
-def where(rig, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("corner")
+    rig = LightRig(load_dict({"type": "scene", **parts}))
     write_glb(folder, [trimesh.creation.box(bounds=[low, high]) for low, high, _ in PARTS.values()])
     return dataclasses.replace(site(rig.scene, folder), rig=rig, parts=("full", "indirect"))
+
+
+@pytest.fixture(scope="module")
+def where(tmp_path_factory):
+    return corner(tmp_path_factory.mktemp("corner"))
+
+
+@pytest.fixture(scope="module")
+def rig(where):
+    return where.rig
 
 
 @pytest.fixture(scope="module")
@@ -186,3 +193,16 @@ def test_a_bake_is_found_again_and_one_that_is_damaged_is_named(where):
     file.write_bytes(bytes(file.stat().st_size))
     with pytest.raises(MethodError, match=r"the transfer in .* cannot be read .*: remove that folder"):
         prepared(where, reflected=2, paths=64, edge=0.2)
+
+
+def test_where_no_light_arrives_there_is_none(where, monkeypatch, tmp_path):
+    monkeypatch.setattr(transfer._Tracer, "lit", lambda self, vertices: vertices[:0])
+    box = Box((-1.5, -1.5, -0.5), (3.0, 3.0, 2.0))
+    dark = transfer.made(
+        where.scene, meshes_of(where.folder), box, edge=0.2, reflected=2, paths=64, max_depth=8
+    )
+    transfer.write(tmp_path, dark)
+    again = transfer.read(tmp_path, 2)
+    assert again.matrices.shape == (1, 9, 3, 81)
+    assert not again.matrices.any()
+    assert not again.row.any()
