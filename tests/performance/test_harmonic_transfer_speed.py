@@ -41,7 +41,9 @@ def test_all_harmonics_at_once(where):
     tracer = transfer._Tracer(where.scene, sides_of(mesh), 0.1, where.max_depth)
     some = np.arange(256)
     once, paths = seconds(
-        partial(tracer.matrices, some, 1024, 8), partial(tracer._paths, some, 64, 1024, 1), repeats=3
+        partial(tracer.matrices, some, 1024, 8),
+        partial(tracer._paths, some, 64, 1024, where.max_depth),
+        repeats=3,
     )
     print(
         f"\n256 matrices of 81 × 81 from 1024 paths each: {1e3 * once:.0f} ms, {once / paths:.1f} times the paths; "

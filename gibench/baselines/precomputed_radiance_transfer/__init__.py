@@ -21,7 +21,7 @@ METHOD = Method(
         ),
         *DENOISED,
         Knob("reflected", 8, (2, 4, 6, 8), "degree of the light that arrives at a vertex", bakes=True),
-        Knob("edge", 0.05, (0.2, 0.1, 0.05, 0.02), "metres along an edge of the even mesh", bakes=True),
+        Knob("edge", 0.05, (0.5, 0.2, 0.1, 0.05, 0.02), "metres along an edge of the even mesh", bakes=True),
         Knob("paths", 1024, (64, 256, 1024, 4096), "from a vertex", bakes=True),
     ),
     budget="spp",

@@ -92,19 +92,19 @@ def paths_out(
     position: Any,
     normal: Any,
     seed: Any,
+    max_depth: Any,
     vertices: int,
     points: int,
     samples: int,
     levels: int,
-    max_depth: int,
 ) -> dict[str, Any]:
     """Paths from the points of vertices, a lane each: `samples` a vertex, dealt out in turn to its `points`.
 
-    position, normal: mi.Point3f, mi.Vector3f, on surfaces, by vertex and then point. vertices: how many. points: at
-    each, a power of two. samples: paths of each, 4^levels. max_depth: scattering events, that at the start included.
-    Returns `arriving`, the direction that light comes along at the start; `towards`, where from; `throughput`, over the
-    density of `arriving`, 0 of paths that did not leave or left straight; `left`, whether a path left, `back` and
-    `near`, whether its first hit was the back of a mesh, or near, 0 or 1.
+    position, normal: mi.Point3f, mi.Vector3f, on surfaces, by vertex and then point. max_depth: mi.UInt32, scattering
+    events, that at the start included. vertices: how many. points: at each, a power of two. samples: paths of each,
+    4^levels. Returns `arriving`, the direction that light comes along at the start; `towards`, where it is from;
+    `throughput`, over the density of `arriving`, 0 of paths that did not leave or left straight; `left`, whether a path
+    left, `back` and `near`, whether its first hit was the back of a mesh, or near, 0 or 1.
     """
     lanes = vertices * samples
     sampler = StratifiedSampler(seed, lanes, levels)
@@ -124,7 +124,7 @@ def paths_out(
         scene.mi_scene, sampler.independent, start.spawn_ray(arriving), max_depth
     )
     throughput *= dr.rcp(density)
-    sound = left & dr.all(dr.isfinite(throughput)) & (max_depth >= 2)
+    sound = left & dr.all(dr.isfinite(throughput))
     number = lambda mask: dr.select(mask, mi.Float(1), mi.Float(0))  # noqa: E731
     found = {
         "arriving": arriving,

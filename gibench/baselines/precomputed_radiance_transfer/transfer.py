@@ -47,8 +47,8 @@ MOST_BYTES = 1 << 30
 RAYS = 16
 """Paths from a point, by which it is known whether it is buried or covered."""
 
-PROBED = 4
-"""Points around a vertex, by which it is known whether anything arrives there."""
+PROBED, PROBED_DEPTH = 4, 3
+"""Points around a vertex, and scattering events of paths from there, by which it is known whether light arrives."""
 
 BURIED, COVERED = 0.25, 7 / 8
 """Shares of the first rays from a point that end at the back of a mesh, or near by, above which no light is no light
@@ -134,9 +134,12 @@ class _Tracer:
         self._place = Replay(scene, partial(on_surface, scene))
         self._trace = Replay(scene, partial(paths_out, scene), permutations(str(mi.variant())))
 
-    def _paths(self, vertices: NDArray[np.int64], points: int, samples: int, lane: int) -> dict[str, Tensor]:
+    def _paths(
+        self, vertices: NDArray[np.int64], points: int, samples: int, max_depth: int
+    ) -> dict[str, Tensor]:
         """`paths_out` of vertices (N,) as tensors (N, samples, …)."""
-        random = np.random.default_rng(np.random.SeedSequence(SEED, spawn_key=(lane, int(vertices[0]))))
+        key = (points, max_depth, int(vertices[0]))
+        random = np.random.default_rng(np.random.SeedSequence(SEED, spawn_key=key))
         at, facing = (part.reshape(-1, 3).T for part in self._around.draw(vertices, points, random))
         place, normal = self._place(
             mi.Point3f(np.ascontiguousarray(at)),
@@ -145,8 +148,8 @@ class _Tracer:
             len(vertices) * points,
         )
         levels = (samples.bit_length() - 1) // 2
-        seed = dr.opaque(mi.UInt32, int(random.integers(2**32)))
-        found = self._trace(place, normal, seed, len(vertices), points, samples, levels, self._max_depth)
+        seed, depth = (dr.opaque(mi.UInt32, number) for number in (int(random.integers(2**32)), max_depth))
+        found = self._trace(place, normal, seed, depth, len(vertices), points, samples, levels)
         shape = (len(vertices), samples)
         return {name: _tensor(values).reshape(*shape, -1) for name, values in found.items()}
 
@@ -154,14 +157,14 @@ class _Tracer:
         """Those of some vertices (N,) with a point that is not buried or covered."""
         step = 4 * LANES // (PROBED * RAYS)
         parts = [vertices[first : first + step] for first in range(0, len(vertices), step)]
-        paths = (self._paths(part, PROBED, PROBED * RAYS, 0) for part in parts)
+        paths = (self._paths(part, PROBED, PROBED * RAYS, PROBED_DEPTH) for part in parts)
         lit = [_open(one, PROBED).any(dim=1).cpu().numpy() for one in paths]
         return np.concatenate([part[mask] for part, mask in zip(parts, lit, strict=True)])
 
     def matrices(self, vertices: NDArray[np.int64], paths: int, reflected: int) -> NDArray[np.float16]:
         """(N, count of `reflected`, 3, 81) of vertices (N,)."""
         points = paths // RAYS
-        found = self._paths(vertices, points, paths, 1)
+        found = self._paths(vertices, points, paths, self._max_depth)
         is_open = _open(found, points)
         weight = found["throughput"] / (RAYS * is_open.sum(dim=1).clamp(min=1))[:, None, None]
         arriving = spherical_harmonics(found["arriving"], reflected)
