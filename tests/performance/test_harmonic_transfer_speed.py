@@ -14,6 +14,7 @@ from gibench.baselines.precomputed_radiance_transfer.implementation import seen_
 from gibench.baselines.precomputed_radiance_transfer.vertices import sides_of
 from gibench.baselines.stages import Stages
 from gibench.baselines.vertex_features.remeshing import even_mesh, meshes_of
+from gibench.rendering.backend import select_variant
 from gibench.rendering.lighting import Shot
 from gibench.rendering.panoramas import HEIGHT
 from tests.baselines.precomputed_radiance_transfer.test_implementation import (
@@ -32,6 +33,7 @@ SIGNED = 2 * 81
 
 @pytest.fixture(scope="module")
 def where(tmp_path_factory):
+    select_variant("auto")
     return corner(tmp_path_factory.mktemp("corner"))
 
 

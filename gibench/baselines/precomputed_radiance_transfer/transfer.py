@@ -51,9 +51,13 @@ PROBED, PROBED_DEPTH = 4, 3
 """Points around a vertex, and scattering events of paths from there, by which it is known whether light arrives."""
 
 BURIED, COVERED = 0.25, 7 / 8
-"""Shares of the first rays from a point that end at the back of a mesh, or near by, above which no light is no light
-that is missing: the point is inside of something, or in a gap. Closed things are dark inside; a wall that has only a
-back, in a scene of somebody's, is not, and counts."""
+"""Shares of the first rays from a point that end at the back of a mesh, or near by. Above the one, and where no path
+leaves, the point is inside of something: closed things are dark inside, while a wall that has only a back, in a scene
+of somebody's, is not. From the other on, it lies in a gap that no camera looks into."""
+
+LIT = 0.5
+"""Share of the points around a vertex that are neither, from which on it has a matrix. A front behind the fronts of
+drawers shows in the gaps between them alone."""
 
 LANES = 1 << 18
 """Paths at a time: their harmonics take 350 MB."""
@@ -154,12 +158,15 @@ class _Tracer:
         return {name: _tensor(values).reshape(*shape, -1) for name, values in found.items()}
 
     def lit(self, vertices: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Those of some vertices (N,) with a point that is not buried or covered."""
+        """Those of some vertices (N,) of whose points LIT are neither buried nor covered, and that a path leaves from."""
         step = 4 * LANES // (PROBED * RAYS)
         parts = [vertices[first : first + step] for first in range(0, len(vertices), step)]
-        paths = (self._paths(part, PROBED, PROBED * RAYS, PROBED_DEPTH) for part in parts)
-        lit = [_open(one, PROBED).any(dim=1).cpu().numpy() for one in paths]
-        return np.concatenate([part[mask] for part, mask in zip(parts, lit, strict=True)])
+        found = [vertices[:0]]
+        for part in parts:
+            paths = self._paths(part, PROBED, PROBED * RAYS, PROBED_DEPTH)
+            some = _open(paths, PROBED).float().mean(dim=1) >= LIT
+            found.append(part[(some & paths["left"].any(dim=1)[:, 0]).cpu().numpy()])
+        return np.concatenate(found)
 
     def matrices(self, vertices: NDArray[np.int64], paths: int, reflected: int) -> NDArray[np.float16]:
         """(N, count of `reflected`, 3, 81) of vertices (N,)."""
@@ -179,7 +186,7 @@ def _open(paths: dict[str, Tensor], points: int) -> Tensor:
     left, back, near = (
         paths[name].reshape(len(paths[name]), -1, points).mean(dim=1) for name in ("left", "back", "near")
     )
-    return (left > 0) | ((back <= BURIED) & (near < COVERED))
+    return ((left > 0) | (back <= BURIED)) & (near < COVERED)
 
 
 def _tensor(values: Any) -> Tensor:
