@@ -158,7 +158,7 @@ class _Tracer:
         return {name: _tensor(values).reshape(*shape, -1) for name, values in found.items()}
 
     def lit(self, vertices: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Those of some vertices (N,) of whose points LIT are neither buried nor covered, and that a path leaves from."""
+        """Those of vertices (N,) that a path leaves from and LIT of whose points are neither buried nor covered."""
         step = 4 * LANES // (PROBED * RAYS)
         parts = [vertices[first : first + step] for first in range(0, len(vertices), step)]
         found = [vertices[:0]]
