@@ -37,12 +37,17 @@ PARTIAL = ".partial-"
 
 @dataclass(frozen=True)
 class Bake:
-    """A folder of baked files. seconds: that making them took, whoever did. size: in bytes on disk."""
+    """A folder of baked files.
+
+    seconds: that making them took, whoever did. size: in bytes on disk. before: seconds among them that runs spent
+    that were cut off, where this process made the rest.
+    """
 
     kind: str
     folder: Path
     seconds: float
     size: int
+    before: float = 0.0
 
 
 class BakeCache:
@@ -92,10 +97,11 @@ class BakeCache:
         folder = self.root / f"{kind}-{name}"
         record = _whole(folder, key, self._views)
         is_new = record is None
+        before = 0.0
         if record is None:
-            _make(folder, key, make, self._views)
+            before = _make(folder, key, make, self._views)
             record = parsed(gate.read_regular(folder / RECORD), BakeRecord)
-        bake = Bake(kind, folder, record["seconds"], record["bytes"])
+        bake = Bake(kind, folder, record["seconds"], record["bytes"], before)
         self._views.book(record["views"])
         if bake.folder not in [used.folder for used in self.used]:
             self.used.append(bake)
@@ -141,7 +147,8 @@ def _size(folder: Path) -> int:
 
 def _make(
     folder: Path, key: dict[str, Any], make: Callable[[Path], float | None], views: TrainingSet
-) -> None:
+) -> float:
+    """Make a bake. Returns the seconds that were spent on it before."""
     with _held(folder.with_name(f".{folder.name}{PARTIAL}{process_number()}")) as partial:
         synchronise()
         start = time.perf_counter()
@@ -163,6 +170,7 @@ def _make(
             if problem.errno not in (errno.EEXIST, errno.ENOTEMPTY) or _whole(folder, key, views) is None:
                 raise
         BakeCache.checkpoint(partial).unlink(missing_ok=True)
+    return before
 
 
 @contextmanager

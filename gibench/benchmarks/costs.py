@@ -27,6 +27,10 @@ def preparation(
     Returns seconds (all of it), one entry for each of `BOOKED`, other, bytes of the bakes, wall, and lists; `curves`
     are those of the trainings (`gibench.baselines.trained.curve_of`).
     """
+
+    def here(bake: Bake) -> float:
+        return bake.seconds - bake.before
+
     booked = dict.fromkeys(BOOKED, 0.0)
     booked["references"] = sum(one.seconds for one in views)
     other = 0.0
@@ -38,13 +42,13 @@ def preparation(
     in_stages = 0.0
     for name, seconds in stages.items():
         # A stage around the making of a bake of its name holds the same seconds once more.
-        seconds = max(0.0, seconds - sum(bake.seconds for bake in made if bake.kind == name))
+        seconds = max(0.0, seconds - sum(here(bake) for bake in made if bake.kind == name))
         in_stages += seconds
         if name in booked:
             booked[name] += seconds
         else:
             other += seconds
-    other += max(0.0, wall - in_stages - sum(bake.seconds for bake in made))
+    other += max(0.0, wall - in_stages - sum(map(here, made)))
     return {
         "seconds": sum(booked.values()) + other,
         **booked,

@@ -48,6 +48,14 @@ def test_time_counts_once_where_a_stage_holds_the_making_of_its_bake():
     assert paid["seconds"] == pytest.approx(6.0)
 
 
+def test_what_runs_spent_that_were_cut_off_is_paid_beside_this_one():
+    training = Bake("training", Path("c"), 9.0, 100, before=4.0)
+    paid = preparation(6.0, {}, [training], [training], [views()])
+    assert paid["training"] == 9.0
+    assert paid["other"] == pytest.approx(1.0)
+    assert paid["seconds"] == pytest.approx(10.0)
+
+
 def test_what_no_name_is_known_for_is_other():
     paid = preparation(3.0, {"sorting": 1.0}, [Bake("tables", Path("c"), 4.0, 8)], [], [views()])
     assert paid["other"] == pytest.approx(7.0)
