@@ -106,17 +106,11 @@ def error_against(
 def _points(
     summary: Summary, track: str, part: str, metric: str, cost: Cost, machine: str | None
 ) -> pd.DataFrame:
-    scores = summary.scores
-    scores = scores[(scores["part"] == part) & (scores["metric"] == metric)]
-    entries = summary.entries[summary.entries["track"] == track]
-    if machine is not None:
-        entries = entries[entries["machine"] == machine]
-    points = entries.drop(columns="rooms").merge(scores, left_index=True, right_on="entry").set_index("entry")
-    points["cost"] = points[cost.column] / cost.unit
-    points["whole"] = points["rooms"] == points["rooms"].max()
-    # Of one frame in one room there is no interval: its ends lie at infinity.
-    points[["low", "high"]] = points[["low", "high"]].replace([-np.inf, np.inf], np.nan)
-    return points[np.isfinite(points["cost"]) & np.isfinite(points["mean"])]
+    points = summary.points(track, part, metric, machine)
+    points = points.assign(
+        cost=points[cost.column] / cost.unit, whole=points["rooms"] == points["rooms"].max()
+    )
+    return points[np.isfinite(points["cost"])]
 
 
 def _about(summary: Summary, track: str, part: str, machine: str | None) -> str:

@@ -22,7 +22,7 @@ from gibench.benchmarks.report.figures import (
 )
 from gibench.benchmarks.report.plot_style import LINES, look, tick_text
 from gibench.benchmarks.report.runs import part_title
-from gibench.benchmarks.report.summary import Summary
+from gibench.benchmarks.report.summary import Summary, is_number, knobs_of, label_without
 from gibench.benchmarks.report.wording import metric_title, printable
 from gibench.metrics import METRICS
 
@@ -60,15 +60,9 @@ class Sweep:
 
 def sweeps(summary: Summary, track: str, part: str, metric: str, machine: str) -> list[Sweep]:
     """Find what was turned: a sweep for each method and knob."""
-    entries = summary.entries
-    entries = entries[(entries["track"] == track) & (entries["machine"] == machine)]
-    scores = summary.scores[(summary.scores["part"] == part) & (summary.scores["metric"] == metric)]
-    scored = entries[["method", "label", "knobs"]].merge(scores, left_index=True, right_on="entry")
-    scored = scored[np.isfinite(scored["mean"])]
-    scored[["low", "high"]] = scored[["low", "high"]].replace([-np.inf, np.inf], np.nan)
     found = []
-    for method, own in scored.groupby("method", sort=False):
-        knobs = [json.loads(text) for text in own["knobs"]]
+    for method, own in summary.points(track, part, metric, machine).groupby("method", sort=False):
+        knobs = [knobs_of(text) for text in own["knobs"]]
         for knob in dict.fromkeys(name for setting in knobs for name in setting):
             lines: dict[str, pd.DataFrame] = {}
             values = [_number(setting.get(knob)) for setting in knobs]
@@ -79,8 +73,7 @@ def sweeps(summary: Summary, track: str, part: str, metric: str, machine: str) -
             rows = own.assign(value=values, others=others).dropna(subset="value").sort_values("value")
             for _, line in rows.groupby("others", sort=False):
                 if line["value"].nunique() >= LEAST:
-                    label = str(line["label"].iloc[0]).split()
-                    lines[" ".join(word for word in label if not word.startswith(f"{knob}="))] = line
+                    lines[label_without(str(line["label"].iloc[0]), knob)] = line
             if lines:
                 found.append(Sweep(str(method), knob, lines))
     return found
@@ -139,7 +132,7 @@ def error_against_settings(
 
 
 def _number(value: Any) -> float:
-    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else math.nan
+    return float(value) if is_number(value) else math.nan
 
 
 def _values(axes: Axes, values: list[float]) -> None:

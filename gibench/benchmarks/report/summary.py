@@ -61,6 +61,21 @@ class Summary:
         """The tracks that results are of, in their order."""
         return list(self.entries["track"].unique())
 
+    def points(self, track: str, part: str, metric: str, machine: str | None = None) -> pd.DataFrame:
+        """The finite scores of a track by entry, beside the columns of `entries`; `rooms` is that of the scores.
+
+        machine: whose; None for all. Intervals of one frame in one room are NaN: their ends lie at infinity.
+        """
+        scores = self.scores[(self.scores["part"] == part) & (self.scores["metric"] == metric)]
+        entries = self.entries[self.entries["track"] == track]
+        if machine is not None:
+            entries = entries[entries["machine"] == machine]
+        points = (
+            entries.drop(columns="rooms").merge(scores, left_index=True, right_on="entry").set_index("entry")
+        )
+        points[["low", "high"]] = points[["low", "high"]].replace([-np.inf, np.inf], np.nan)
+        return points[np.isfinite(points["mean"])]
+
     def metrics(self, part: str, *, in_time: bool | None = None) -> list[str]:
         """Metrics that were computed on a part, in the order of the registry."""
         found = set(self.scores.loc[self.scores["part"] == part, "metric"])
@@ -191,14 +206,14 @@ def _curves(entries: pd.DataFrame) -> tuple[list[str], list[str]]:
 
     A curve joins settings of one method that differ in one number: the one that takes most values.
     """
-    knobs = [_knobs(text) for text in entries["knobs"]]
+    knobs = [knobs_of(text) for text in entries["knobs"]]
     curves, steps = [], []
     for position, (method, own) in enumerate(zip(entries["method"], knobs, strict=True)):
         siblings = [k for k, other in zip(knobs, entries["method"], strict=True) if other == method]
         counts = {
             name: len({json.dumps(other.get(name)) for other in siblings})
             for name, value in own.items()
-            if isinstance(value, int | float) and not isinstance(value, bool)
+            if is_number(value)
         }
         turned = max(counts, key=lambda name: counts[name]) if counts and max(counts.values()) > 1 else None
         label = str(entries["label"].iloc[position])
@@ -206,14 +221,23 @@ def _curves(entries: pd.DataFrame) -> tuple[list[str], list[str]]:
             curves.append(label)
             steps.append("")
             continue
-        # Said as the label says it, without the number that is turned.
-        words = [word for word in label.split() if not word.startswith(f"{turned}=")]
-        curves.append(" ".join(words))
+        curves.append(label_without(label, turned))
         steps.append(f"{own[turned]:g} {turned}" if turned == "spp" else f"{turned}={own[turned]:g}")
     return curves, steps
 
 
-def _knobs(text: Any) -> dict[str, Any]:
+def label_without(label: str, knob: str) -> str:
+    """What a label says beside one knob."""
+    return " ".join(word for word in label.split() if not word.startswith(f"{knob}="))
+
+
+def is_number(value: Any) -> bool:
+    """Whether a knob's value is a number that can be turned up and down."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def knobs_of(text: Any) -> dict[str, Any]:
+    """The knobs of an entry; none where they are no JSON object."""
     value = json.loads(text) if isinstance(text, str) and text else {}
     return value if isinstance(value, dict) else {}
 

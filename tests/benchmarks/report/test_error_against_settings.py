@@ -48,6 +48,19 @@ def test_two_values_or_truth_are_no_line(tmp_path):
     assert error_against_settings(summary, "walkthrough", "full", "rmse", summary.machines[0]) is None
 
 
+def test_knobs_that_are_no_json_object_are_no_line(tmp_path):
+    run = SyntheticRun(
+        tmp_path,
+        chosen=[wavelets(16), wavelets(64), wavelets(256)],
+        frames=1,
+        metrics=("rmse",),
+        measured=False,
+    )
+    run.results["knobs"] = "[1]"
+    run.results.loc[run.results["label"] == "nfvr wavelets=64", "knobs"] = None
+    assert not found(summarise(run))
+
+
 @pytest.mark.parametrize("metric", ["rmse", "psnr"])
 def test_panels_share_a_scale_and_have_ticks_where_values_are(tmp_path, metric):
     summary = summary_of(tmp_path, [*settings(), *map(wavelets, (16, 32, 64, 128, 256))])
