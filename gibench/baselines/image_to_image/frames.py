@@ -69,16 +69,20 @@ def held_out(views: TrainingSet, share: float, most: int) -> tuple[list[int], li
     apart = set(kinds[-max(1, round(share * len(kinds))) :])
     learned = [number for number, kind in enumerate(of_frame) if kind not in apart]
     others = [number for number, kind in enumerate(of_frame) if kind in apart]
-    count = min(most, len(others))
-    return learned, [others[k * len(others) // count] for k in range(count)]
+    return learned, spaced(others, most)
+
+
+def spaced(numbers: Sequence[int], most: int) -> list[int]:
+    """So many of some numbers, or all where there are fewer, spread evenly from the first one on."""
+    count = min(most, len(numbers))
+    return [numbers[k * len(numbers) // count] for k in range(count)]
 
 
 def share_of(views: TrainingSet, numbers: Sequence[int], share: float) -> list[int]:
     """Those frames that are a share of some, one at least, spread evenly: whole rooms where there are several."""
     of_frame = _groups(views)
     groups = sorted({of_frame[number] for number in numbers})
-    count = max(1, round(share * len(groups)))
-    kept = {groups[k * len(groups) // count] for k in range(count)}
+    kept = set(spaced(groups, max(1, round(share * len(groups)))))
     return [number for number in numbers if of_frame[number] in kept]
 
 

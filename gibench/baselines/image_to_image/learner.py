@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import nullcontext
 from dataclasses import dataclass
 from typing import Any
 
@@ -123,7 +122,7 @@ class IndirectLight(Learner):
         batch = _on(batch, self.device)
         set_rate(self.optimisers["network"], RATE * half_cosine(now.progress))
         inputs = Inputs.of(batch["direct"], batch["albedo"], batch["geometry"], batch["unit"])
-        with mixed(self.device) if self.mixed else nullcontext():
+        with mixed(self.device, pays=self.mixed):
             code = self.network(inputs.light, inputs.geometry)
         light = OUTPUT.decode(code.float())
         # Where no direct light is in view nothing can be learned: what comes out is black.

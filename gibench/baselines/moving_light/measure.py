@@ -14,7 +14,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from gibench.baselines.image_to_image.frames import Frames, Images
+from gibench.baselines.image_to_image.frames import Frames, Images, spaced
 from gibench.baselines.training.codes import LogCode
 from gibench.baselines.training.errors import TrainingError
 from gibench.datasets.lightings import lighting_of
@@ -121,6 +121,5 @@ def unit_vectors(vectors: Tensor) -> Tensor:
 
 def measured(frames: Frames, *, per_area: bool = False) -> Measure:
     """The measure of a room, by MEASURED of its training frames. per_area: see `Measure.of_frames`."""
-    few = min(MEASURED, len(frames))
-    some = [k * len(frames) // few for k in range(few)]
+    some = spaced(range(len(frames)), MEASURED)
     return Measure.of_frames([(frames[k], area_of(frames, k)) for k in some], per_area=per_area)

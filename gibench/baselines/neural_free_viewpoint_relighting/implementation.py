@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar, cast
+from typing import ClassVar, cast
 
 import numpy as np
 import torch
@@ -32,7 +32,7 @@ class NeuralRelighting(RelitByNetwork):
         """Take other settings that do not train."""
         super().adjust(settings)
         self._wavelets = int(settings["wavelets"])
-        self._places = self._before = np.zeros(0, dtype=np.int64)
+        self._before = np.zeros(0, dtype=np.int64)
         self._selection = cast("Weighting", settings["selection"])
 
     def field(self, size: Size) -> nn.Module:
@@ -55,17 +55,17 @@ class NeuralRelighting(RelitByNetwork):
     def told(self, light: Light) -> tuple[Tensor, Tensor]:
         """Places and weights of the wavelets that matter most."""
         places, weights = chosen_light(light, self._wavelets, self._selection)
-        self._energy = energy_kept(light, places)
-        self._before, self._places = self._places, places
         return torch.from_numpy(places).to(torch_device()), torch.from_numpy(weights).to(torch_device())
 
-    def numbers(self, view: View, told: Any) -> dict[str, float]:
+    def numbers(self, view: View, light: Light, told: tuple[Tensor, Tensor]) -> dict[str, float]:
         """`energy`: share of the environment's that the chosen wavelets hold. `replaced`: share of them that the frame
         before had not, where there is one.
         """
-        found = {"energy": self._energy}
+        places = told[0].cpu().numpy()
+        found = {"energy": energy_kept(light, places)}
         if view.previous is not None:
-            found["replaced"] = replaced(self._places, self._before)
+            found["replaced"] = replaced(places, self._before)
+        self._before = places
         return found
 
     def radiance(self, points: Tensor, material: Tensor, told: tuple[Tensor, Tensor]) -> Tensor:

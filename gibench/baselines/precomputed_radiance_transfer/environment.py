@@ -97,9 +97,7 @@ def turned(coefficients: NDArray[np.float64], angle: float) -> NDArray[np.float6
     angle = float(np.mod(angle / (2 * np.pi), 1.0)) * 2 * np.pi
     partner = coefficients[bands**2 + bands - m]
     # Of cos mφ stands at m, of sin mφ at −m.
-    return np.asarray(
-        np.cos(m * angle)[:, None] * coefficients - np.sin(np.where(m == 0, 0, m) * angle)[:, None] * partner
-    )
+    return np.asarray(np.cos(m * angle)[:, None] * coefficients - np.sin(m * angle)[:, None] * partner)
 
 
 @lru_cache(maxsize=64)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from gibench.baselines.image_to_image.device_frames import DeviceFrames
+from gibench.baselines.image_to_image.frames import spaced
 from gibench.baselines.method import Method, Setting, Site, View, reading
 from gibench.baselines.precomputed_radiance_transfer import METHOD, transfer
 from gibench.baselines.precomputed_radiance_transfer.environment import (
@@ -87,16 +88,14 @@ class HarmonicTransfer(Relit):
         windowed = light[: count(self._degree)] * window(self._window, self._degree)[:, None]
         if self._arrived is None or not np.array_equal(windowed, self._arrived.light):
             self._arrived = Arrived(self._matrices, windowed)
-            plain = negative_share(light[: count(self._degree)])
-            self._rings = {
-                "negative_environment": negative_share(windowed),
-                "negative_unwindowed": plain,
-            }
         return self._arrived
 
-    def numbers(self, view: View, told: Arrived) -> dict[str, float]:
+    def numbers(self, view: View, light: Light, told: Arrived) -> dict[str, float]:
         """How much ringing there is: shares of negative light in the environment, as taken and without a window."""
-        return dict(self._rings)
+        return {
+            "negative_environment": negative_share(told.light),
+            "negative_unwindowed": negative_share(light[: count(self._degree)]),
+        }
 
     def sent(self, pixels: Pixels, told: Arrived) -> Tensor:
         """Both lobes' share of what arrives at the surfaces, interpolated between vertices."""
@@ -154,8 +153,7 @@ def seen_box(site: Site, frames: DeviceFrames) -> Box:
     if not isinstance(views, TrainingSet) or not len(views):
         bounds = site.scene.mi_scene.bbox()
         return Box.around([torch.tensor(np.array([bounds.min, bounds.max], np.float32).reshape(2, 3))])
-    number = min(MEASURED, len(views))
-    rows = [views.frames.iloc[k * len(views) // number] for k in range(number)]
+    rows = [views.frames.iloc[number] for number in spaced(range(len(views)), MEASURED)]
     images = (frames.read(camera_of({str(k): v for k, v in row.items()}), SURVEY) for row in rows)
     return Box.around(one["position"][:, hit(one)].T.cpu() for one in images)
 

@@ -133,7 +133,7 @@ def _rows(sides: Sides, vertices: NDArray[np.int64], edge: float) -> NDArray[np.
 
 class _Tracer:
     def __init__(self, scene: Scene, sides: Sides, edge: float, max_depth: int) -> None:
-        self._around, self._sides = PointsAround(sides.mesh), sides
+        self._around = PointsAround(sides.mesh)
         self._reach, self._max_depth = FARTHEST * edge, max_depth
         self._place = Replay(scene, partial(on_surface, scene))
         self._trace = Replay(scene, partial(paths_out, scene), permutations(str(mi.variant())))

@@ -11,7 +11,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from gibench.baselines.image_to_image.frames import Frames
+from gibench.baselines.image_to_image.frames import Frames, spaced
 from gibench.baselines.relighting import CHANNELS
 from gibench.baselines.relighting.surfaces import Box, hit, surfaces
 from gibench.baselines.training.codes import MuLaw
@@ -122,8 +122,7 @@ def some_of(seen: Seen, pixel: Tensor) -> tuple[Tensor, Tensor, Tensor]:
 
 def evenly(seen: Seen, most: int) -> Tensor:
     """Numbers of pixels, `most` of them at most, spread over a frame."""
-    count = min(most, len(seen.points))
-    return torch.arange(count) * len(seen.points) // max(count, 1)
+    return torch.tensor(spaced(range(len(seen.points)), most), dtype=torch.int64)
 
 
 def environment_at(views: TrainingSet, number: int) -> EnvironmentMap:
@@ -140,9 +139,7 @@ def environment_at(views: TrainingSet, number: int) -> EnvironmentMap:
 
 def box_of(views: TrainingSet, numbers: Sequence[int]) -> Box:
     """The box of the places that some of the frames see."""
-    count = min(MEASURED, len(numbers))
-    some = [numbers[k * len(numbers) // count] for k in range(count)]
-    frames = Frames(views, ("position", "normal"), some)
+    frames = Frames(views, ("position", "normal"), spaced(numbers, MEASURED))
     read = (frames[index] for index in range(len(frames)))
     return Box.around(images["position"][:, hit(images)].T for images in read)
 

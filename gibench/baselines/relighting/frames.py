@@ -52,8 +52,8 @@ class Relit(DirectLight):
     def told(self, light: Light) -> Any:
         """What the light of all surfaces is made from, once a frame."""
 
-    def numbers(self, view: View, told: Any) -> dict[str, float]:
-        """What is worth a column of the light that a frame was told of."""
+    def numbers(self, view: View, light: Light, told: Any) -> dict[str, float]:
+        """What is worth a column of the light of a frame, and of what was told of it. Asked for once a frame."""
         return {}
 
     @abstractmethod
@@ -85,7 +85,7 @@ class Relit(DirectLight):
             if self._last is None or self._last[0] != environment:
                 self._last = environment, self.light_of(environment)
             told = self.told(self._last[1])
-            extra = self.numbers(view, told)
+            extra = self.numbers(view, self._last[1], told)
         with stages.stage(self.stage), torch.inference_mode():
             signed = self.signed(images, view, told)
             indirect = signed.clamp(min=0)
@@ -95,12 +95,8 @@ class Relit(DirectLight):
                 np.asarray(direct), indirect, [np.asarray(guide) for guide in guides], extra
             )
 
-    def indirect(self, images: Images, view: View, told: Any) -> Tensor:
-        """Indirect radiance (H, W, 3), ≥ 0, on the device; 0 where no surface is seen."""
-        return self.signed(images, view, told).clamp(min=0)
-
     def signed(self, images: Images, view: View, told: Any) -> Tensor:
-        """`indirect` as it was worked out, before what no light has is cut off."""
+        """Indirect radiance (H, W, 3) on the device, before what is negative is cut off; 0 where no surface is seen."""
         seen = hit(images)
         pixels = surfaces(images, view.camera, seen)
         found = self.sent(pixels, told)

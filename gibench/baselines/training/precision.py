@@ -13,10 +13,11 @@ def has_tiles() -> bool:
     return bool(supported and supported())
 
 
-def mixed(device: torch.device) -> AbstractContextManager[None]:
+def mixed(device: torch.device, *, pays: bool = True) -> AbstractContextManager[None]:
     """Within it, products of matrices and convolutions take bfloat16 numbers, if that is faster on the device.
 
-    It is where a processor has tiles; without them a step takes longer than in single precision. Weights and what they
-    learn by stay in single precision: backward passes are made outside.
+    It is where a processor has tiles; without them a step takes longer than in single precision. pays: whether it does
+    for the network at all. Weights and what they learn by stay in single precision: backward passes are made outside.
     """
-    return torch.autocast("cpu", torch.bfloat16, enabled=device.type == "cpu" and has_tiles())
+    enabled = pays and device.type == "cpu" and has_tiles()
+    return torch.autocast("cpu", torch.bfloat16, enabled=enabled)

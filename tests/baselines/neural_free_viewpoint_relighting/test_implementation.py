@@ -40,10 +40,9 @@ def test_frames_say_how_much_the_selection_holds_and_how_it_flickers():
         light = method.light_of(EnvironmentMap(Panorama.of("made", pixels), rotation=0.2 * number))
         told = method.told(light)
         chosen.append(told[0].numpy())
-        said = method.numbers(following if number else first, told)
+        said = method.numbers(following if number else first, light, told)
         assert said["energy"] == pytest.approx(energy_kept(light, largest(light, 32, "area")))
         assert 0 < said["energy"] < 1
         assert ("replaced" in said) == bool(number)
     assert said["replaced"] == len(set(chosen[1]) - set(chosen[0])) / 32 > 0
-    method.told(light)
-    assert method.numbers(following, told)["replaced"] == 0
+    assert method.numbers(following, light, method.told(light))["replaced"] == 0

@@ -130,7 +130,7 @@ def test_brighter_light_is_as_much_brighter_light(rig, method):
 def test_a_black_environment_gives_black(method):
     images = method._surfaces.read(CAMERA, RESOLUTION)
     black = 0 * method.light_of(environment(noise()))
-    found = method.indirect(images, View(Shot(CAMERA), None, RESOLUTION, 0, 0), method.told(black))
+    found = method.signed(images, View(Shot(CAMERA), None, RESOLUTION, 0, 0), method.told(black))
     assert found.shape == (32, 40, 3)
     assert not found.any()
 
