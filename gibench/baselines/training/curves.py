@@ -6,6 +6,7 @@ import math
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
+from gibench.baselines.training.budget import Plan
 from gibench.baselines.training.learner import Weights
 
 Ended = Literal["steps", "seconds", "patience", "diverged"]
@@ -29,15 +30,16 @@ class Trained:
     """The end of a training.
 
     weights: those with the smallest held-out error, the earliest of equal ones, by network and name. best: the look at
-    them; its step is 0 where the networks as they were built are the best. planned: steps that learning rates were laid
-    out for, steps: those that were made. seconds: in all; of these, before: in runs cut off, waited: for data.
+    them; its step is 0 where the networks as they were built are the best. plans: how learning rates were laid out; the
+    last one holds to the end. steps: those that were made. seconds: in all; of these, before: in runs cut off, waited:
+    for data.
     """
 
     weights: Weights
     best: Look
     curve: tuple[Look, ...]
     steps: int
-    planned: int
+    plans: tuple[Plan, ...]
     seconds: float
     before: float
     waited: float
@@ -52,7 +54,7 @@ class Trained:
         return {
             "ended": self.ended,
             "steps": self.steps,
-            "planned_steps": self.planned,
+            "plans": [asdict(plan) for plan in self.plans],
             "seconds": self.seconds,
             "waited_seconds": self.waited,
             "best": plain(self.best),

@@ -20,7 +20,7 @@ from typing import Any
 
 from torch import Tensor
 
-from gibench.baselines.training.budget import LOOKS, PLANNED_AFTER, WARM, Budget
+from gibench.baselines.training.budget import LOOKS, PLANNED_FROM, WARM, Budget, Plan, next_plan
 from gibench.baselines.training.checkpoints import Checkpoint, machine
 from gibench.baselines.training.curves import Ended, Look, Trained
 from gibench.baselines.training.errors import CheckpointError, TrainingError
@@ -78,7 +78,10 @@ class _Run:
         self.device = learner.device
         self.owner: dict[str, Any] = {"seed": seed, **machine(self.device)}
         self.owner |= {f"budget {name}": value for name, value in asdict(budget).items() if value is not None}
-        self.step, self.planned, self.looks = 0, budget.steps, LOOKS
+        self.step = 0
+        self.plans: list[Plan] = []
+        self.planned_at = 0.0  # progress at the last plan
+        self.plan_again = PLANNED_FROM  # progress, by the clock or by steps, at which steps are planned next
         self.seconds = self.before = self.waited = 0.0
         self.curve: list[Look] = []
         self.best: Look
@@ -87,7 +90,11 @@ class _Run:
         self.sums = [0.0, 0]  # of the loss to watch since the last look, and how many
         self.unread: list[dict[str, Tensor]] = []
         self.a_look = 0.0
-        self.made, self.warm_seconds = 0, 0.0  # steps of this run, and what those took that are a measure
+        self.made = 0  # steps of this run
+        self.measured, self.measured_seconds = 0, 0.0  # steps since the last plan, and what they took
+        if budget.steps is not None and budget.plans is None:
+            every = budget.look_every or math.ceil(budget.steps / LOOKS)
+            self.plans.append(Plan(0, budget.steps, every))
 
     def begin(self) -> None:
         """From a checkpoint, or with a look at the networks as they are."""
@@ -124,25 +131,48 @@ class _Run:
         except StopIteration:
             raise TrainingError(f"the batches end before step {self.step + 1}: they must go on") from None
         given = time.perf_counter()
-        progress = min(self.step / self.planned, 1.0) if self.planned else 0.0
-        now = Step(self.step, progress, random_of_step(self.seed, self.step))
+        now = Step(self.step, self._progress(), random_of_step(self.seed, self.step))
         losses = self.learner.step(batch, now)
         self.unread.append({name: value.detach() for name, value in losses.items()})
         self.step += 1
         self.waited += given - asked
         self.made += 1
         if self.made > WARM:
-            self.warm_seconds += time.perf_counter() - asked
+            self.measured += 1
+            self.measured_seconds += time.perf_counter() - asked
+
+    @property
+    def planned(self) -> int | None:
+        """Steps of the whole training, as far as it is known."""
+        return self.plans[-1].steps if self.plans else None
+
+    def _progress(self) -> float:
+        """Of the training, in [0, 1]. A new plan spreads what is left over the steps that are left: it never jumps."""
+        if not self.plans:
+            return 0.0
+        plan = self.plans[-1]
+        over = (self.step - plan.at) / (plan.steps - plan.at)
+        return min(self.planned_at + (1 - self.planned_at) * over, 1.0)
 
     def _plan(self) -> None:
-        """Number of steps of the whole training, once it is known."""
-        if self.planned is None and self.made > WARM:
+        """Plan the steps, where it is time to: other work on the machine comes and goes, and steps may grow longer
+        towards the end.
+        """
+        plan = None
+        if self.budget.plans is not None:
+            plan = next((plan for plan in self.budget.plans if plan.at == self.step), None)
+        elif self.budget.steps is None and self.measured:
             assert self.budget.seconds is not None
             spent = self._now()
-            if spent >= PLANNED_AFTER * self.budget.seconds:
-                a_step = self.warm_seconds / (self.made - WARM)
-                self.planned = self.budget.planned(self.step, spent, a_step, self.a_look)
-                self.looks = self.budget.looks(self.a_look)
+            share = max(spent / self.budget.seconds, self._progress())
+            if share >= self.plan_again:
+                a_step = self.measured_seconds / self.measured
+                plan = self.budget.plan(self.step, len(self.curve) - 1, spent, a_step, self.a_look)
+                self.plan_again = next_plan(share)
+                self.measured, self.measured_seconds = 0, 0.0
+        if plan is not None:
+            self.planned_at = self._progress()
+            self.plans.append(plan)
 
     def _settle(self, write: Write) -> None:
         """Work after a step: losses are read, the held-out error is looked at, the state is kept, or all ends."""
@@ -164,7 +194,7 @@ class _Run:
             self._save()
 
     def _spent(self) -> Ended | None:
-        if self.step == self.planned:
+        if self.step == (self.budget.steps or self.planned):
             return "steps"
         # The last look belongs to the training too.
         due = self.a_look if self.curve[-1].step != self.step else 0.0
@@ -173,8 +203,8 @@ class _Run:
         return None
 
     def _look_is_due(self) -> bool:
-        every = self.budget.look_every or (math.ceil(self.planned / self.looks) if self.planned else None)
-        return every is not None and self.step % every == 0
+        every = self.plans[-1].look_every if self.plans else self.budget.look_every
+        return every is not None and self.step - self.curve[-1].step >= every
 
     def _look(self) -> None:
         started = time.perf_counter()
@@ -218,7 +248,7 @@ class _Run:
             best=self.best,
             curve=tuple(self.curve),
             steps=self.step,
-            planned=self.planned or self.step,
+            plans=tuple(self.plans),
             seconds=self.seconds,
             before=self.before,
             waited=self.waited,
@@ -250,6 +280,7 @@ class _Run:
             "weights": self.weights,
             "best": astuple(self.best),
             "curve": [astuple(look) for look in self.curve],
+            "plans": [astuple(plan) for plan in self.plans],
             "sums": self.sums,
             **{name: getattr(self, name) for name in _NUMBERS},
         }
@@ -264,6 +295,7 @@ class _Run:
             }
             self.best = Look(*state["best"])
             self.curve = [Look(*look) for look in state["curve"]]
+            self.plans = [Plan(*plan) for plan in state["plans"]]
             self.sums = list(state["sums"])
             for name in _NUMBERS:
                 setattr(self, name, state[name])
@@ -271,5 +303,5 @@ class _Run:
             raise CheckpointError(unreadable(self.checkpoint.path, problem)) from problem
 
 
-_NUMBERS = ("step", "planned", "looks", "seconds", "waited", "ended", "a_look")
+_NUMBERS = ("step", "planned_at", "plan_again", "seconds", "waited", "ended", "a_look")
 """Attributes of a run that a checkpoint keeps."""

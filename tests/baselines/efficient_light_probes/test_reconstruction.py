@@ -130,7 +130,7 @@ def test_the_network_is_trained_once_and_every_setting_that_does_not_bake_has_it
     assert bake.seconds > 0
     told = artifacts.record(bake.folder)
     assert told["best"]["step"] in [look["step"] for look in told["curve"]]
-    assert 0 < told["steps"] <= told["planned_steps"]
+    assert 0 < told["steps"] <= told["plans"][-1]["steps"]
 
 
 def test_killed_while_it_trains_it_goes_on_and_is_charged_for_all_of_it(where, monkeypatch):

@@ -15,7 +15,7 @@ import pytest
 import torch
 
 from gibench.baselines.training import loop
-from gibench.baselines.training.budget import Budget
+from gibench.baselines.training.budget import Budget, Plan
 from gibench.baselines.training.checkpoints import Checkpoint
 from gibench.baselines.training.errors import TrainingError
 from gibench.baselines.training.loop import train
@@ -87,7 +87,8 @@ def test_it_learns_and_keeps_the_best_weights():
     before = learner.look()
     trained = train(learner, points(), Budget(steps=400), seed=0)
     assert trained.ended == "steps"
-    assert trained.steps == trained.planned == 400
+    assert trained.steps == 400
+    assert trained.plans == (Plan(0, 400, 8),)
     assert trained.best.error < 0.4 * before
     assert trained.best.error == min(look.error for look in trained.curve)
     learner.networks["fit"].load_state_dict(trained.weights["fit"])
@@ -220,49 +221,97 @@ def test_a_budget_too_small_for_a_step_gives_the_untrained_network(clock):
     assert trained.best.step in (0, 1)
 
 
-def test_where_only_seconds_are_given_the_steps_are_planned_and_can_be_repeated(clock):
-    class Notes(Fit):
-        def __init__(self):
-            super().__init__()
-            self.seen = []
+class Notes(Fit):
+    """Keeps the progress of each step."""
 
-        def step(self, batch, now):
-            self.seen.append(now.progress)
-            return super().step(batch, now)
+    def __init__(self):
+        super().__init__()
+        self.seen = []
 
+    def step(self, batch, now):
+        self.seen.append(now.progress)
+        return super().step(batch, now)
+
+
+def test_where_only_seconds_are_given_the_steps_are_planned(clock):
     learner = slow(Notes(), 0.01, 0.01, clock)
     trained = train(learner, points(), Budget(seconds=3.0), seed=0)
     # .06 s, 2 %, are over after six steps; 50 looks are paid for first.
-    assert trained.planned == pytest.approx((3.0 - 50 * 0.01) / 0.01, abs=3)
+    assert trained.plans[0].at <= 7
+    for plan in trained.plans:
+        assert plan.steps == pytest.approx((3.0 - 50 * 0.01) / 0.01, abs=3)
     assert trained.ended == "steps"
     assert trained.seconds == pytest.approx(3.0, abs=0.05)
-    assert len(trained.curve) <= 1 + 50
-    planned_at = sum(progress == 0 for progress in learner.seen)
-    assert planned_at <= 7
-    assert learner.seen[planned_at:] == [n / trained.planned for n in range(planned_at, trained.steps)]
+    assert len(trained.curve) == pytest.approx(1 + 50, abs=2)
+    assert learner.seen == pytest.approx([n / trained.steps for n in range(trained.steps)], abs=0.03)
+
+
+@pytest.mark.parametrize("changed", [0.2, 0.4, 4.0])
+@pytest.mark.parametrize("at", [20, 150, 0.85])
+def test_a_training_takes_its_seconds_whatever_becomes_of_the_speed(clock, at, changed):
+    """Other work ends or begins at a step, or steps are others from some progress on: learning rates follow."""
+    learner = slow(Notes(), 0.01, 0.01, clock)
+    step = learner.step
+
+    def other(batch, now):
+        over = now.progress >= at if at < 1 else now.number >= at
+        clock.sleep(0.01 * (changed - 1) if over else 0)
+        return step(batch, now)
+
+    learner.step = other
+    trained = train(learner, points(), Budget(seconds=3.0), seed=0)
+    assert trained.seconds == pytest.approx(3.0, rel=0.04)
+    assert learner.seen == sorted(learner.seen)
+    # A step is a three hundredth of the training; where steps take four times as long the last few share what is left.
+    assert max(after - before for before, after in itertools.pairwise(learner.seen)) < (
+        0.1 if changed > 1 else 0.02
+    )
+    assert learner.seen[-1] > 0.95
+    assert len(trained.curve) <= 1 + 50 + 2
+
+
+def test_a_training_by_the_clock_can_be_repeated(tmp_path, clock):
+    def learner():
+        made = slow(Fit(), 0.01, 0.02, clock)
+        step = made.step
+        made.step = lambda batch, now: (clock.sleep(0.02 if 30 < now.number < 60 else 0), step(batch, now))[1]
+        return made
+
+    trained = train(learner(), points(), Budget(seconds=3.0), seed=0)
+    assert len(trained.plans) > 5
+    budget = Budget(steps=trained.steps, plans=trained.plans)
+    again = train(Fit(), points(), budget, seed=0)
+    assert torch.equal(flat(again.weights), flat(trained.weights))
+    assert [look.step for look in again.curve] == [look.step for look in trained.curve]
+    assert again.plans == trained.plans
+
+    checkpoint = Checkpoint(tmp_path / "c", {"method": "toy"}, every=0)
+    with pytest.raises(Killed):
+        train(dies_at(Fit(), 50), points(), budget, seed=0, checkpoint=checkpoint)
+    after = train(Fit(), points(), budget, seed=0, checkpoint=checkpoint)
+    assert torch.equal(flat(after.weights), flat(trained.weights))
+
+
+@pytest.mark.parametrize(
+    "budget",
+    [
+        {"seconds": 3.0, "plans": (Plan(0, 3, 1),)},
+        {"steps": 3, "look_every": 1, "plans": (Plan(0, 3, 1),)},
+        {"steps": 3, "plans": (Plan(2, 2, 1),)},
+        {"steps": 3, "plans": (Plan(1, 3, 1), Plan(1, 4, 1))},
+    ],
+)
+def test_plans_that_are_none_are_refused(budget):
+    with pytest.raises(TrainingError, match="budget: plans"):
+        Budget(**budget)
 
 
 def test_looks_that_take_long_are_few(clock):
     """A fifth of the seconds is theirs at most, and the steps have the rest."""
     trained = train(slow(Fit(), 0.01, 0.2, clock), points(), Budget(seconds=5.0), seed=0)
-    assert trained.planned == pytest.approx((5.0 - 5 * 0.2 - 0.2) / 0.01, abs=12)
+    assert trained.plans[-1].steps == pytest.approx((5.0 - 5 * 0.2 - 0.2) / 0.01, abs=12)
     assert len(trained.curve) <= 1 + 5 + 1
     assert trained.seconds == pytest.approx(5.0, abs=0.25)
-
-
-def test_planned_steps_that_take_longer_than_they_did_end_with_the_seconds(clock):
-    learner = slow(Fit(), 0.01, 0.0, clock)
-    quick = learner.step
-
-    def slower(batch, now):
-        clock.sleep(0.03 if now.number > 50 else 0)
-        return quick(batch, now)
-
-    learner.step = slower
-    trained = train(learner, points(), Budget(seconds=3.0), seed=0)
-    assert trained.ended == "seconds"
-    assert trained.steps < trained.planned
-    assert trained.seconds == pytest.approx(3.0, abs=0.05)
 
 
 def test_patience_ends_it():
