@@ -11,7 +11,8 @@ from torch import Tensor
 
 from gibench.baselines.image_to_image.camera_space import in_camera_space, mirrored
 from gibench.baselines.image_to_image.frames import Frames, Images
-from gibench.baselines.image_to_image.shading import CHANNELS, brightness, demodulated, geometry
+from gibench.baselines.image_to_image.shading import CHANNELS, demodulated, geometry
+from gibench.baselines.image_to_image.units import Units, area_light
 from gibench.baselines.training.crops import random_window
 
 TRUTH = "indirect_diffuse"
@@ -21,56 +22,58 @@ READ = (*CHANNELS, TRUTH)
 """Channels of a training frame."""
 
 STOPS = 2.0
-"""A frame is at most that many stops brighter or darker than its mean says."""
+"""A frame is at most that many stops brighter or darker than its mean says, where that is all that is known of it."""
 
 
 class Examples:
-    """Frames in camera space, and how they are exposed."""
+    """Frames in camera space, how they are exposed, and the units of their light."""
 
-    def __init__(self, frames: Frames) -> None:
+    def __init__(self, frames: Frames, units: Units) -> None:
         """frames: with the channels READ."""
-        self.frames = frames
+        self.frames, self.units = frames, units
 
     def __len__(self) -> int:
         """How many."""
         return len(self.frames)
 
     def __getitem__(self, index: int) -> Images:
-        """READ of a frame (C, H, W), and "exposure" (1, 1, 1)."""
+        """READ of a frame (C, H, W), "exposure" and "unit" (1, 1, 1)."""
         images = in_camera_space(self.frames[index], self.frames.camera(index))
-        return {**images, "exposure": torch.full((1, 1, 1), self.frames.exposure(index))}
+        light = demodulated(images["direct_diffuse"], images["albedo"])
+        unit = self.units.of(light, area_light(self.frames, index))
+        return {**images, "exposure": torch.full((1, 1, 1), self.frames.exposure(index)), "unit": unit}
 
 
 def inputs_of(example: Images) -> Images:
     """direct, truth, albedo (3, H, W), radiance; geometry; unit of light and exposure (1, 1, 1). Of a whole frame."""
-    unit = brightness(demodulated(example["direct_diffuse"], example["albedo"]))
     return {
         "direct": example["direct_diffuse"],
         "truth": example[TRUTH],
         "albedo": example["albedo"],
         "geometry": geometry(example),
-        "unit": unit,
+        "unit": example["unit"],
         "exposure": example["exposure"],
     }
 
 
 @dataclass(frozen=True)
 class Draw:
-    """Draws what a step sees of an example. crop: pixels along a side at most."""
+    """Draws what a step sees of an example. crop: pixels along a side at most. stops: of exposure, up and down."""
 
     crop: int
+    stops: float = STOPS
 
     def __call__(self, example: Any, random: np.random.Generator) -> Images:
         """As `inputs_of`, cut to a window.
 
         Units are those of the whole frame, as they are when it is rendered.
         """
-        exposure = example["exposure"]
-        images = {name: image for name, image in example.items() if name != "exposure"}
+        numbers = {name: example[name] for name in ("exposure", "unit")}
+        images = {name: image for name, image in example.items() if name not in numbers}
         if random.random() < 0.5:
             images = mirrored(images)
-        found = inputs_of({**images, "exposure": exposure})
-        found["unit"] = found["unit"] * 2.0 ** random.uniform(-STOPS, STOPS)
+        found = inputs_of({**images, **numbers})
+        found["unit"] = found["unit"] * 2.0 ** random.uniform(-self.stops, self.stops)
         window = random_window(found["direct"].shape[-2:], self.crop, random)
         return {name: _cut(image, window) for name, image in found.items()}
 

@@ -13,7 +13,8 @@ from gibench.baselines.image_to_image.device_frames import DeviceFrames, channel
 from gibench.baselines.image_to_image.examples import READ, Examples
 from gibench.baselines.image_to_image.frames import Frames, held_out, share_of
 from gibench.baselines.image_to_image.learner import EPOCHS, IndirectLight, TrainingPlan
-from gibench.baselines.image_to_image.shading import CHANNELS, geometry, indirect
+from gibench.baselines.image_to_image.shading import CHANNELS, demodulated, geometry, indirect
+from gibench.baselines.image_to_image.units import Units
 from gibench.baselines.method import MethodError, Prediction, Setting, Site, Training, View, reading
 from gibench.baselines.sources import digest
 from gibench.baselines.stages import Stages
@@ -56,7 +57,9 @@ class IndirectByNetwork(DirectLight):
         plan = TrainingPlan.of(self.settings, training.seed)
         with seeded(plan.seed):
             network = self.network().to(torch_device())
-        examples = [Examples(Frames(views, READ, numbers)) for numbers in (learned, apart)]
+        frames = [Frames(views, READ, numbers) for numbers in (learned, apart)]
+        units = Units.of_frames(frames[0])
+        examples = [Examples(some, units) for some in frames]
         learner = IndirectLight(network, examples[0], examples[1], plan, mixed=self.mixed)
         steps = None if training.seconds else EPOCHS * -(-len(learned) // plan.batch)
         owner = {**self.settings, "views": views.sha256, "sources": digest(type(self).__module__)}
@@ -68,7 +71,8 @@ class IndirectByNetwork(DirectLight):
             checkpoint=Checkpoint(training.checkpoint, owner),
             title=type(self).__name__,
         )
-        artifacts.keep(training.folder, trained)
+        facts = {} if units.in_view is None else {"in_view": units.in_view}
+        artifacts.keep(training.folder, trained, **facts)
         return trained.before
 
     def prepare(self, site: Site) -> None:
@@ -78,7 +82,9 @@ class IndirectByNetwork(DirectLight):
             raise MethodError("the network has not been trained: it needs the folder that `train` filled")
         network = self.network()
         with reading("the trained network", site.weights):
-            network.load_state_dict(artifacts.kept(site.weights)[0]["network"])
+            weights, facts = artifacts.kept(site.weights)
+            network.load_state_dict(weights["network"])
+            self._units = Units(float(facts["in_view"]) if "in_view" in facts else None)
         self.parameters = sum(one.numel() for one in network.parameters())
         self._network = network.eval().requires_grad_(False).to(torch_device())
         self._surfaces = DeviceFrames(site.scene, [name for name in CHANNELS if name != "direct_diffuse"])
@@ -90,7 +96,9 @@ class IndirectByNetwork(DirectLight):
             surfaces = in_camera_space(self._surfaces.read(view.camera, view.resolution), view.camera)
         with stages.stage("inference"), torch.inference_mode():
             full, direct = (channels_first(parts[name]) for name in ("full", "direct_diffuse"))
-            made = indirect(self._network, direct[None], surfaces["albedo"][None], geometry(surfaces)[None])[
+            albedo = surfaces["albedo"]
+            unit = self._units.of(demodulated(direct, albedo), view.shot.lighting.area)
+            made = indirect(self._network, direct[None], albedo[None], geometry(surfaces)[None], unit[None])[
                 0
             ]
             images = [image.movedim(0, -1).contiguous() for image in (full + made, made)]

@@ -9,7 +9,7 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
-from gibench.baselines.image_to_image.examples import Draw, Examples, inputs_of
+from gibench.baselines.image_to_image.examples import STOPS, Draw, Examples, inputs_of
 from gibench.baselines.image_to_image.frames import Images
 from gibench.baselines.image_to_image.shading import LIGHT, OUTPUT, Inputs, demodulated
 from gibench.baselines.method import Setting
@@ -105,14 +105,15 @@ class IndirectLight(Learner):
     def batches(self, processes: int = 0) -> Batches:
         """Of what `step` learns from."""
         plan = self.plan
-        return batches(self.learned, plan.batch, plan.seed, draw=Draw(plan.crop), processes=processes)
+        draw = Draw(plan.crop, STOPS if self.learned.units.own else 0.0)
+        return batches(self.learned, plan.batch, plan.seed, draw=draw, processes=processes)
 
     def error(self) -> Tensor:
         """Mean absolute difference of display values of diffuse light, direct and indirect, of whole frames."""
         errors = []
         for example in self.held_out:
             batch = _on(example, self.device)
-            inputs = Inputs.of(batch["direct"], batch["albedo"], batch["geometry"])
+            inputs = Inputs.of(batch["direct"], batch["albedo"], batch["geometry"], batch["unit"])
             made = inputs.radiance(self.network(inputs.light, inputs.geometry))
             errors.append(absolute(*_shown(batch, made)))
         return torch.stack(errors).mean()
@@ -125,7 +126,7 @@ class IndirectLight(Learner):
         with mixed(self.device, pays=self.mixed):
             code = self.network(inputs.light, inputs.geometry)
         light = OUTPUT.decode(code.float())
-        # Where no direct light is in view nothing can be learned: what comes out is black.
+        # Where its unit is 0, no direct light being in view, nothing can be learned: what comes out is black.
         lit = inputs.unit > 0
         truth = demodulated(batch["truth"], inputs.albedo) / torch.where(lit, inputs.unit, 1)
         truth = torch.where(lit, truth, light.detach())

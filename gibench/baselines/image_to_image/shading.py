@@ -2,8 +2,8 @@
 
 Direct light is divided by albedo, and what the network says is multiplied by it (Gai, Wang & Li, Geometry-Aware Global
 Feature Aggregation for Real-Time Indirect Illumination, section 3.1). They learn from random exposures that a brighter
-room is the same room (section 3.3); here light is also divided by its own mean, so that it is so for any network, and
-its numbers stay in the range that it was trained in. Lengths are divided by the mean depth.
+room is the same room (section 3.3); here light is also divided by its unit (see `units`), so that it is so for any
+network, and its numbers stay in the range that it was trained in. Lengths are divided by the mean depth.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ DARKEST = 0.01
 """Added to albedo before anything is divided by it: black surfaces reflect nothing, and nothing is what they get."""
 
 OUTPUT = Exponential(largest=1e4, smallest=1e-6)
-"""Of indirect light over albedo, in units of the mean direct light."""
+"""Of indirect light over albedo, in its unit."""
 
 
 def demodulated(radiance: Tensor, albedo: Tensor) -> Tensor:
@@ -60,8 +60,8 @@ def geometry(images: Images) -> Tensor:
 class Inputs:
     """What a network is given of frames. light: (N, LIGHT, 3, H, W), compressed direct light over albedo, and albedo.
 
-    geometry: (N, GEOMETRY, H, W). unit: (N, 1, 1, 1), of the light: 0 where no direct light is in view, and then what
-    comes out is black, for light is linear. albedo: (N, 3, H, W).
+    geometry: (N, GEOMETRY, H, W). unit: (N, 1, 1, 1), of the light: where it is the mean of what is in view and that is
+    0, what comes out is black, for light is linear. albedo: (N, 3, H, W).
     """
 
     light: Tensor
@@ -70,10 +70,9 @@ class Inputs:
     albedo: Tensor
 
     @staticmethod
-    def of(direct: Tensor, albedo: Tensor, geometry: Tensor, unit: Tensor | None = None) -> Inputs:
-        """direct: direct diffuse radiance (N, 3, H, W), ≥ 0. unit: `brightness` unless it is given."""
+    def of(direct: Tensor, albedo: Tensor, geometry: Tensor, unit: Tensor) -> Inputs:
+        """direct: direct diffuse radiance (N, 3, H, W), ≥ 0. unit: (N, 1, 1, 1), ≥ 0."""
         light = demodulated(direct, albedo)
-        unit = brightness(light) if unit is None else unit
         light = torch.log1p(light / torch.where(unit > 0, unit, 1))
         return Inputs(torch.stack([light, albedo], dim=1), geometry, unit, albedo)
 
@@ -82,17 +81,21 @@ class Inputs:
         return self.radiance_of(OUTPUT.decode(code))
 
     def radiance_of(self, light: Tensor) -> Tensor:
-        """Indirect light over albedo, in units of the mean direct light, as radiance."""
+        """Indirect light over albedo, in its unit, as radiance."""
         return remodulated(light * self.unit, self.albedo)
 
 
-def indirect(network: nn.Module, direct: Tensor, albedo: Tensor, geometry: Tensor) -> Tensor:
+def indirect(
+    network: nn.Module, direct: Tensor, albedo: Tensor, geometry: Tensor, unit: Tensor | None = None
+) -> Tensor:
     """Indirect diffuse radiance (N, 3, H, W), finite and ≥ 0.
 
     network: of (light, geometry) as in `Inputs`, gives logarithms. direct: direct diffuse radiance (N, 3, H, W), ≥ 0.
-    geometry: (N, GEOMETRY, H, W).
+    geometry: (N, GEOMETRY, H, W). unit: of light over albedo, (N, 1, 1, 1), its mean by default.
     """
-    inputs = Inputs.of(direct, albedo, geometry)
+    if unit is None:
+        unit = brightness(demodulated(direct, albedo))
+    inputs = Inputs.of(direct, albedo, geometry, unit)
     return inputs.radiance(network(inputs.light, inputs.geometry))
 
 

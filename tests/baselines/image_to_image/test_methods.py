@@ -12,7 +12,8 @@ from gibench.baselines.image_to_image import implementation
 from gibench.baselines.image_to_image.examples import READ, Draw, Examples, inputs_of
 from gibench.baselines.image_to_image.frames import Frames
 from gibench.baselines.image_to_image.learner import IndirectLight, TrainingPlan
-from gibench.baselines.image_to_image.shading import GEOMETRY, Inputs, indirect
+from gibench.baselines.image_to_image.shading import GEOMETRY, Inputs, brightness, demodulated, indirect
+from gibench.baselines.image_to_image.units import Units
 from gibench.baselines.method import MethodError, Training
 from gibench.baselines.stages import Stages
 from gibench.baselines.training import artifacts
@@ -112,7 +113,7 @@ def test_a_training_and_a_frame(room, weights, tmp_path):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_step_of_each(views, name):
-    frames = Examples(Frames(views, READ))
+    frames = Examples(Frames(views, READ), Units())
     learner = IndirectLight(network(name), frames, frames, TrainingPlan(32, 2, True, True, 0))
     before = learner.look()
     assert np.isfinite(before)
@@ -159,7 +160,8 @@ def test_a_room_that_is_lit_a_hundred_thousand_times_brighter_is_the_same_room(n
 
 def radiance(net, example):
     one = {name: image[None] for name, image in inputs_of(example).items()}
-    inputs = Inputs.of(one["direct"], one["albedo"], one["geometry"])
+    unit = brightness(demodulated(one["direct"], one["albedo"]))
+    inputs = Inputs.of(one["direct"], one["albedo"], one["geometry"], unit)
     return inputs.radiance(net(inputs.light, inputs.geometry))[0]
 
 
@@ -168,7 +170,7 @@ def test_from_the_file_to_radiance_colours_and_exposure_are_what_they_are(views,
     """With trained weights: permuted colours come out permuted, a brighter frame brighter."""
     net = network("gfa")
     net.load_state_dict(artifacts.kept(weights)[0]["network"])
-    example = Examples(Frames(views, READ))[0]
+    example = Examples(Frames(views, READ), Units())[0]
     expected = radiance(net, example)
     assert expected.std() > 0
     colours = ("direct_diffuse", "albedo", "indirect_diffuse")
@@ -185,7 +187,7 @@ def test_from_the_file_to_radiance_colours_and_exposure_are_what_they_are(views,
 
 
 def test_frames_without_direct_light_teach_nothing(views):
-    frames = Examples(Frames(views, READ))
+    frames = Examples(Frames(views, READ), Units())
     learner = IndirectLight(network("bcn"), frames, frames, TrainingPlan(32, 1, False, False, 0))
     batch = next(iter(learner.batches()(0)))
     batch = {**batch, "direct": 0 * batch["direct"], "unit": 0 * batch["unit"]}
@@ -194,7 +196,7 @@ def test_frames_without_direct_light_teach_nothing(views):
 
 
 def test_what_a_step_sees(views):
-    example = Examples(Frames(views, READ))[0]
+    example = Examples(Frames(views, READ), Units())[0]
     whole = inputs_of(example)
     seen = [Draw(16)(example, np.random.default_rng(seed)) for seed in range(24)]
     assert {tuple(one["direct"].shape) for one in seen} == {(3, 16, 16)}

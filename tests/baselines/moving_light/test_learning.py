@@ -10,9 +10,16 @@ import pytest
 import torch
 
 from gibench.baselines.bakes import BakeCache
+from gibench.baselines.image_to_image import implementation
+from gibench.baselines.image_to_image.examples import READ, Draw, Examples
+from gibench.baselines.image_to_image.frames import Frames
+from gibench.baselines.image_to_image.learner import IndirectLight, TrainingPlan
+from gibench.baselines.image_to_image.shading import brightness, demodulated
+from gibench.baselines.image_to_image.units import Units, area_light, flux
 from gibench.baselines.method import Training, View
 from gibench.baselines.stages import Stages
 from gibench.baselines.training import artifacts
+from gibench.baselines.training.learner import Step
 from gibench.baselines.training_set import training_set
 from gibench.benchmarks.registry import installed
 from gibench.datasets.loading import open_dataset
@@ -110,3 +117,68 @@ def test_observations_are_made_once_and_leave_the_light_as_it_was(room, rig, tmp
     _, again = prepared("cnnr", room, rig, tmp_path)
     assert not again.bakes.made
     assert {bake.kind for bake in again.bakes.used} == {"observations", "training"}
+
+
+def test_light_of_image_networks_is_in_units_of_what_the_light_gives_off(room):
+    frames = Frames(training_set(room), READ)
+    units = Units.of_frames(frames)
+    assert not units.own
+    examples = Examples(frames, units)
+    read = [(examples[k], area_light(frames, k)) for k in range(len(examples))]
+    found = [float(example["unit"]) / flux(area) for example, area in read]
+    assert found == pytest.approx([units.in_view] * len(found))
+    seen = [
+        float(brightness(demodulated(example["direct_diffuse"], example["albedo"]))) for example, _ in read
+    ]
+    assert units.in_view == pytest.approx(
+        np.mean([s / flux(area) for s, (_, area) in zip(seen, read, strict=True)])
+    )
+    # How bright the room is is known: exposures are not drawn.
+    drawn = Draw(16, 0.0)(examples[0], np.random.default_rng(0))
+    assert torch.equal(drawn["unit"], examples[0]["unit"])
+    # Nothing is known of it where a light gives nothing, or nothing of it was ever in view.
+    assert flux(dataclasses.replace(read[0][1], radiance=(0, 0, 0))) == 1
+    light = demodulated(read[0][0]["direct_diffuse"], read[0][0]["albedo"])
+    assert torch.equal(Units().of(light, read[0][1]), brightness(light))
+
+
+def test_a_frame_that_sees_no_direct_light_teaches_an_image_network(room):
+    frames = Frames(training_set(room), READ)
+    examples = Examples(frames, Units.of_frames(frames))
+    torch.manual_seed(0)
+    network = (
+        installed().get("bcn").method.load()({**installed().get("bcn").method.settings(), "width": 0.125})
+    )
+    learner = IndirectLight(network.network(), examples, examples, TrainingPlan(24, 1, False, False, 0))
+    batch = next(iter(learner.batches()(0)))
+    losses = learner.step({**batch, "direct": 0 * batch["direct"]}, Step(0, 0.0, np.random.default_rng(0)))
+    assert losses["content"] > 0
+
+
+def test_an_image_network_gives_frames_by_the_unit_that_it_learned_in(room, rig, tmp_path):
+    method = installed().get("bcn").method
+    settings = method.settings({"width": 0.125, "perceptual": False, "denoise": False, "spp": 4})
+    views = training_set(room)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(implementation, "EPOCHS", 1)
+        method.load()(settings).train(Training(views, None, 0, tmp_path, tmp_path / "checkpoint", Stages()))
+    facts = artifacts.kept(tmp_path)[1]
+    running = method.load()(settings)
+    running.prepare(dataclasses.replace(site(rig.scene, tmp_path), weights=tmp_path, rig=rig))
+    shot = next(Shot(frame.camera, frame.lighting) for frame in open_dataset(room))
+    rig.set(shot.lighting)
+    found = running.render(View(shot, None, RESOLUTION, 0, 0), Stages())
+    assert (found.indirect > 0).any()
+    # Light is linear, and known by what the source gives off: twice as much gives twice as much.
+    area = dataclasses.replace(shot.lighting.area, radiance=tuple(2 * c for c in shot.lighting.area.radiance))
+    rig.set(Lighting(area))
+    twice = running.render(View(Shot(shot.camera, Lighting(area)), None, RESOLUTION, 0, 0), Stages())
+    np.testing.assert_allclose(twice.indirect, 2 * found.indirect, rtol=1e-4, atol=1e-7)
+    # A light that nothing in view sees leaves what the unit says, which is not black.
+    below = dataclasses.replace(area, centre=(0, 0, -5), direction=(0, 0, -1))
+    rig.set(Lighting(below))
+    unlit = running.render(View(Shot(shot.camera, Lighting(below)), None, RESOLUTION, 0, 0), Stages())
+    assert np.isfinite(unlit.color).all()
+    assert unlit.extra["lit"] == 0
+    assert facts["in_view"] > 0
+    assert (unlit.indirect > 0).any()

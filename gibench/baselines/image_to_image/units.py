@@ -1,0 +1,68 @@
+"""Units of the light of frames, in which a network is given it and says what it makes of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+from torch import Tensor
+
+from gibench.baselines.image_to_image.frames import Frames, spaced
+from gibench.baselines.image_to_image.shading import brightness, demodulated
+from gibench.datasets.lightings import lighting_of
+from gibench.rendering.lighting import AreaLight
+
+MEASURED = 64
+"""Training frames that are looked at."""
+
+
+@dataclass(frozen=True)
+class Units:
+    """Of a room that an area light lights: what that gives off, times a constant of the room. Of others: the mean of a
+    frame's own direct light.
+
+    The mean direct light in view says little where the light moves: in a living room whose indirect light varies by a
+    factor of 7, light and light in view are apart by 10⁷, and one frame of fifteen sees no direct light at all.
+
+    in_view: mean direct light over albedo, over `flux`; None without area lights.
+    """
+
+    in_view: float | None = None
+
+    @staticmethod
+    def of_frames(frames: Frames) -> Units:
+        """From training frames with direct light and albedo."""
+        numbers = spaced(range(len(frames)), MEASURED)
+        areas = [area_light(frames, number) for number in numbers]
+        shares: list[float] = []
+        for number, area in zip(numbers, areas, strict=True):
+            if area is None:
+                return Units()
+            images = frames[number]
+            light = demodulated(images["direct_diffuse"], images["albedo"])
+            shares.append(float(brightness(light)) / flux(area))
+        mean = sum(shares) / len(shares)
+        return Units(mean) if mean > 0 else Units()
+
+    def of(self, light: Tensor, area: AreaLight | None) -> Tensor:
+        """(…, 1, 1, 1) of direct light over albedo (…, 3, H, W). area: the light of the frame."""
+        if self.in_view is None or area is None:
+            return brightness(light)
+        return torch.full_like(brightness(light), self.in_view * flux(area))
+
+    @property
+    def own(self) -> bool:
+        """Whether they are a frame's own, so that nobody knows how bright a room is."""
+        return self.in_view is None
+
+
+def area_light(frames: Frames, index: int) -> AreaLight | None:
+    """The area light of a frame, None where it has none."""
+    row = {str(name): value for name, value in frames.rows.iloc[index].items()}
+    return lighting_of(row, Path()).area if row.get("lighting") == "area-light" else None
+
+
+def flux(area: AreaLight) -> float:
+    """Mean radiance of the colours times area, W·sr⁻¹; 1 for a light that gives none."""
+    return sum(area.radiance) / 3 * area.area or 1.0
