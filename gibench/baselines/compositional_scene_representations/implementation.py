@@ -29,7 +29,7 @@ from gibench.baselines.linearly_transformed_cosines.implementation import area_l
 from gibench.baselines.method import MethodError, Prediction, Setting, Site, View, reading
 from gibench.baselines.moving_light import SURFACE
 from gibench.baselines.moving_light.lit_frames import LitFrames
-from gibench.baselines.moving_light.measure import HELD_OUT, JUDGED, Measure, area_of, measured
+from gibench.baselines.moving_light.measure import HELD_OUT, JUDGED, Measure, area_of, measured, unit_of
 from gibench.baselines.sources import digest
 from gibench.baselines.stages import Stages
 from gibench.baselines.training import artifacts
@@ -60,7 +60,7 @@ class RepresentedLight:
             raise MethodError("cnnr learns from frames under area lights: run it on the track moving-light")
         frames = Frames(views, METHOD.channels)
         learned, judged = held_out(views, HELD_OUT, JUDGED)
-        measure = measured(Frames(views, METHOD.channels, learned), per_area=True)
+        measure = measured(Frames(views, METHOD.channels, learned))
         cameras = observers([frames.camera(number) for number in learned], measure)
         self.observe(site, cameras, measure)
         names = METHOD.baked_settings(self.settings)
@@ -123,5 +123,5 @@ class RepresentedLight:
         with stages.stage("inference"), torch.inference_mode():
             pixels = described(frame.images, view.camera, self.measure)
             code = self.network(light[None], pixels[None])[0].clamp(0, np.log1p(LARGEST))
-            unit = code.new_tensor(area.radiance)[:, None, None] * (area.area * self.measure.indirect)
+            unit = unit_of(area).to(code.device) * self.measure.indirect
             return frame.with_indirect(torch.expm1(code) * unit)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import torch
 from torch import Tensor
@@ -10,7 +11,9 @@ from torch import Tensor
 from gibench.baselines.training.errors import TrainingError
 from gibench.baselines.training_set import TrainingSet
 from gibench.datasets.cameras import camera_of
+from gibench.datasets.lightings import lighting_of
 from gibench.rendering.camera import PinholeCamera
+from gibench.rendering.lighting import AreaLight
 
 Images = dict[str, Tensor]
 """Channel → (C, H, W) float32."""
@@ -46,6 +49,11 @@ class Frames:
     def camera(self, index: int) -> PinholeCamera:
         """Of a frame."""
         return camera_of({str(name): value for name, value in self.rows.iloc[index].items()})
+
+    def area_light(self, index: int) -> AreaLight | None:
+        """That lights a frame alone; None where it is lit by something else."""
+        row = {str(name): value for name, value in self.rows.iloc[index].items()}
+        return lighting_of(row, Path()).area if row.get("lighting") == "area-light" else None
 
     def exposure(self, index: int) -> float:
         """1 / radiance of white of a frame as it is shown; 1 where it is black."""

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import torch
 from torch import Tensor
 
 from gibench.baselines.image_to_image.frames import Frames, spaced
 from gibench.baselines.image_to_image.shading import brightness, demodulated
-from gibench.datasets.lightings import lighting_of
 from gibench.rendering.lighting import AreaLight
 
 MEASURED = 64
@@ -34,7 +32,7 @@ class Units:
     def of_frames(frames: Frames) -> Units:
         """From training frames with direct light and albedo."""
         numbers = spaced(range(len(frames)), MEASURED)
-        areas = [area_light(frames, number) for number in numbers]
+        areas = [frames.area_light(number) for number in numbers]
         shares: list[float] = []
         for number, area in zip(numbers, areas, strict=True):
             if area is None:
@@ -55,12 +53,6 @@ class Units:
     def own(self) -> bool:
         """Whether they are a frame's own, so that nobody knows how bright a room is."""
         return self.in_view is None
-
-
-def area_light(frames: Frames, index: int) -> AreaLight | None:
-    """The area light of a frame, None where it has none."""
-    row = {str(name): value for name, value in frames.rows.iloc[index].items()}
-    return lighting_of(row, Path()).area if row.get("lighting") == "area-light" else None
 
 
 def flux(area: AreaLight) -> float:

@@ -1,14 +1,13 @@
-"""What numbers of a room are divided by, and radiance in units of an area light's.
+"""What numbers of a room are divided by, and light in units of what an area light gives off.
 
-Light is linear: direct light, cues and prediction are divided by the radiance of the area light, colour by colour, so
-that a brighter or a redder light is the same light to a network.
+Light is linear: direct light, cues and prediction are divided by the radiance of the area light times its area, colour
+by colour, so that a brighter, a redder or, from afar, a larger light is the same light to a network.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import torch
@@ -17,7 +16,6 @@ from torch import Tensor
 from gibench.baselines.image_to_image.frames import Frames, Images, spaced
 from gibench.baselines.training.codes import LogCode
 from gibench.baselines.training.errors import TrainingError
-from gibench.datasets.lightings import lighting_of
 from gibench.rendering.lighting import AreaLight
 
 CODE = LogCode(largest=1e4)
@@ -37,8 +35,7 @@ HELD_OUT, JUDGED = 0.05, 8
 class Measure:
     """What numbers of a room are divided by.
 
-    centre, half: of the box of all places that training frames see, m. direct, indirect: mean radiance over that of the
-    light.
+    centre, half: of the box of all places that training frames see, m. direct, indirect: mean of `per_flux`.
     """
 
     centre: tuple[float, float, float]
@@ -63,11 +60,8 @@ class Measure:
         return Measure(centre, half, float(facts["direct"]), float(facts["indirect"]))  # type: ignore[arg-type]
 
     @staticmethod
-    def of_frames(frames: Sequence[tuple[Images, AreaLight]], *, per_area: bool = False) -> Measure:
-        """From frames with positions, reflected ones where they have them, direct and indirect light.
-
-        per_area: whether light is also divided by the area of its source, m².
-        """
+    def of_frames(frames: Sequence[tuple[Images, AreaLight]]) -> Measure:
+        """From frames with positions, reflected ones where they have them, direct and indirect light."""
         lowest, highest = torch.full((3,), torch.inf), torch.full((3,), -torch.inf)
         sums = torch.zeros(2, dtype=torch.float64)
         for images, area in frames:
@@ -82,8 +76,7 @@ class Measure:
             for number, kind in enumerate(("direct", "indirect")):
                 light = images[f"{kind}_diffuse"] + images[f"{kind}_specular"]
                 # Highlights of near-mirrors would set the scale alone.
-                unit = area.area if per_area else 1.0
-                sums[number] += per_radiance(light, area).clamp(max=1).double().mean() / unit
+                sums[number] += per_radiance(light, area).clamp(max=1).double().mean() / area.area
         empty = ~(highest > lowest).all()
         centre = torch.zeros(3) if empty else (lowest + highest) / 2
         half = torch.ones(3) if empty else ((highest - lowest) / 2).clamp(min=1e-3)
@@ -98,17 +91,21 @@ def per_radiance(light: Tensor, area: AreaLight) -> Tensor:
 
 
 def per_flux(light: Tensor, area: AreaLight) -> Tensor:
-    """Radiance (3, H, W) in units of the light's radiance times its area: networks are not told how large it is."""
+    """Radiance (3, H, W) in units of the light's radiance times its area, m²: networks are not told how large it is."""
     return per_radiance(light, area) / area.area
+
+
+def unit_of(area: AreaLight) -> Tensor:
+    """(3, 1, 1): radiance of one unit of `per_flux`, W·m⁻²·sr⁻¹."""
+    return torch.tensor(area.radiance)[:, None, None] * area.area
 
 
 def area_of(frames: Frames, index: int) -> AreaLight:
     """The light of a frame. Raises TrainingError where no area light lights it."""
-    row = {str(name): value for name, value in frames.rows.iloc[index].items()}
-    area = lighting_of(row, Path()).area
+    area = frames.area_light(index)
     if area is None:
         raise TrainingError(
-            f"training frame {row['file']} is not lit by an area light: make the dataset with --lighting area-light"
+            f"training frame {frames.rows.iloc[index]['file']} is not lit by an area light: make the dataset with --lighting area-light"
         )
     return area
 
@@ -119,7 +116,7 @@ def unit_vectors(vectors: Tensor) -> Tensor:
     return vectors / torch.where(length > 0, length, 1)
 
 
-def measured(frames: Frames, *, per_area: bool = False) -> Measure:
-    """The measure of a room, by MEASURED of its training frames. per_area: see `Measure.of_frames`."""
+def measured(frames: Frames) -> Measure:
+    """The measure of a room, by MEASURED of its training frames."""
     some = spaced(range(len(frames)), MEASURED)
-    return Measure.of_frames([(frames[k], area_of(frames, k)) for k in some], per_area=per_area)
+    return Measure.of_frames([(frames[k], area_of(frames, k)) for k in some])

@@ -10,7 +10,7 @@ from gibench.baselines.image_to_image.frames import Frames, held_out, share_of
 from gibench.baselines.linearly_transformed_cosines.implementation import area_light
 from gibench.baselines.method import MethodError, Prediction, Setting, Site, Training, View, reading
 from gibench.baselines.moving_light.lit_frames import LitFrames
-from gibench.baselines.moving_light.measure import CODE, HELD_OUT, JUDGED, Measure, measured
+from gibench.baselines.moving_light.measure import CODE, HELD_OUT, JUDGED, Measure, measured, unit_of
 from gibench.baselines.neural_global_illumination import METHOD, SURFACE
 from gibench.baselines.neural_global_illumination.inputs import assembled
 from gibench.baselines.neural_global_illumination.network import NeuralGlobalIllumination
@@ -79,5 +79,5 @@ class NeuralLight:
         with stages.stage("inference"), torch.inference_mode():
             inputs = assembled(frame.images, view.camera, area, self.measure, self._lighting)
             code = self.network(inputs[None])[0]
-            unit = code.new_tensor(area.radiance)[:, None, None] * self.measure.indirect
+            unit = unit_of(area).to(code.device) * self.measure.indirect
             return frame.with_indirect(CODE.decode(code) * unit)

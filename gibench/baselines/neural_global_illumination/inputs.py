@@ -1,6 +1,6 @@
 """What the network is given of a frame (Gao et al. 2022, section 3.2), from files and on the device alike.
 
-Direct light and cues are divided by the radiance of the area light (`moving_light.measure`). Where a perfect mirror is
+Direct light and cues are divided by what the area light gives off (`moving_light.measure`). Where a perfect mirror is
 seen, position, normal and diffuse albedo are those of what it shows, and view and light direction start there;
 roughness 0, the mirror's own reflectance and its cues say that it is one.
 """
@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from gibench.baselines.image_to_image.frames import Images
-from gibench.baselines.moving_light.measure import CODE, Measure, per_radiance, unit_vectors
+from gibench.baselines.moving_light.measure import CODE, Measure, per_flux, unit_vectors
 from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.channels import CUES
 from gibench.rendering.lighting import AreaLight
@@ -54,7 +54,7 @@ def assembled(
     ]
     direct = images["direct_diffuse"] + images["direct_specular"]
     lights = (direct, *(images[name] for name in CUES))
-    coded = [CODE.encode(per_radiance(light, area) / measure.direct) for light in lights]
+    coded = [CODE.encode(per_flux(light, area) / measure.direct) for light in lights]
     told = {"all": 1 + len(CUES), "no-cues": 1, "position": 0}[lighting]
     parts += [part if number < told else torch.zeros_like(part) for number, part in enumerate(coded)]
     parts.append(

@@ -13,7 +13,7 @@ from torch import Tensor
 from gibench.baselines.image_to_image.frames import Frames
 from gibench.baselines.method import Setting
 from gibench.baselines.moving_light.kept import KeptExamples
-from gibench.baselines.moving_light.measure import CODE, Measure, area_of, per_radiance
+from gibench.baselines.moving_light.measure import CODE, Measure, area_of, per_flux, unit_of
 from gibench.baselines.neural_global_illumination.inputs import assembled
 from gibench.baselines.neural_global_illumination.network import FULL, SMALL, NeuralGlobalIllumination, Size
 from gibench.baselines.training.batches import batches
@@ -76,10 +76,10 @@ class Examples(KeptExamples[Example]):
         images, area = self.frames[index], area_of(self.frames, index)
         indirect = images["indirect_diffuse"] + images["indirect_specular"]
         inputs = assembled(images, self.frames.camera(index), area, self.measure, self.lighting)
-        code = CODE.encode(per_radiance(indirect, area) / self.measure.indirect)
+        code = CODE.encode(per_flux(indirect, area) / self.measure.indirect)
         exposure = self.frames.exposure(index)
         rest = ((images["color"] - indirect).clamp(min=0) * exposure).clamp(max=1)
-        shown = torch.tensor(area.radiance)[:, None, None] * (self.measure.indirect * exposure)
+        shown = unit_of(area) * (self.measure.indirect * exposure)
         return Example(inputs, code, rest, shown)
 
 

@@ -11,7 +11,7 @@ from gibench.baselines.linearly_transformed_cosines.implementation import area_l
 from gibench.baselines.method import MethodError, Prediction, Setting, Site, Training, View, reading
 from gibench.baselines.moving_light import SURFACE
 from gibench.baselines.moving_light.lit_frames import LitFrames
-from gibench.baselines.moving_light.measure import HELD_OUT, JUDGED, Measure, measured
+from gibench.baselines.moving_light.measure import HELD_OUT, JUDGED, Measure, measured, unit_of
 from gibench.baselines.radiance_regression import METHOD
 from gibench.baselines.radiance_regression.network import CellNetworks
 from gibench.baselines.radiance_regression.partition import Partition
@@ -50,7 +50,7 @@ class RegressedLight:
         learned, judged = (
             Frames(views, METHOD.channels, numbers) for numbers in held_out(views, HELD_OUT, JUDGED)
         )
-        measure = measured(learned, per_area=True)
+        measure = measured(learned)
         points = all_points(learned, measure, training.seed)
         partition = room_of(points, int(self.settings["cells"]))
         most = 1 << 62
@@ -90,5 +90,5 @@ class RegressedLight:
             for some in seen.split(AT_ONCE):
                 points, others = (part.flatten(1)[:, some].T for part in (place, rest))
                 light[:, some] = predicted(self.networks, self.partition, points, others).T
-            unit = light.new_tensor(area.radiance)[:, None, None] * (area.area * self.measure.indirect)
+            unit = unit_of(area).to(light.device) * self.measure.indirect
             return frame.with_indirect(light.reshape(place.shape) * unit)

@@ -12,7 +12,7 @@ from gibench.baselines.compositional_scene_representations import training as re
 from gibench.baselines.linearly_transformed_cosines import METHOD as DIRECT
 from gibench.baselines.linearly_transformed_cosines.implementation import AnalyticLight
 from gibench.baselines.method import View
-from gibench.baselines.moving_light.measure import CODE, Measure, per_flux, per_radiance
+from gibench.baselines.moving_light.measure import CODE, Measure, per_flux
 from gibench.baselines.neural_global_illumination import SURFACE
 from gibench.baselines.neural_global_illumination.inputs import assembled
 from gibench.baselines.radiance_regression import training as regressing
@@ -103,16 +103,15 @@ def images(rig):
 def test_inputs_and_truth_are_finite(images):
     assert not images["albedo"].any()
     indirect = images["indirect_diffuse"] + images["indirect_specular"]
-    for per_area, light in ((False, per_radiance(indirect, LIGHT)), (True, per_flux(indirect, LIGHT))):
-        measure = Measure.of_frames([(images, LIGHT)], per_area=per_area)
-        assert measure.indirect > 0
-        assert CODE.encode(light / measure.indirect).isfinite().all()
-        assert assembled(images, CAMERA, LIGHT, measure, "all").isfinite().all()
-        assert representing.described(images, CAMERA, measure).isfinite().all()
+    measure = Measure.of_frames([(images, LIGHT)])
+    assert measure.indirect > 0
+    assert CODE.encode(per_flux(indirect, LIGHT) / measure.indirect).isfinite().all()
+    assert assembled(images, CAMERA, LIGHT, measure, "all").isfinite().all()
+    assert representing.described(images, CAMERA, measure).isfinite().all()
 
 
 def test_networks_of_parts_learn_there(images):
-    measure = Measure.of_frames([(images, LIGHT)], per_area=True)
+    measure = Measure.of_frames([(images, LIGHT)])
     place, rest = regressing.described(images, CAMERA, LIGHT, measure)
     indirect = images["indirect_diffuse"] + images["indirect_specular"]
     code = CODE.encode(per_flux(indirect, LIGHT) / measure.indirect)

@@ -15,7 +15,7 @@ from gibench.baselines.image_to_image.examples import READ, Draw, Examples
 from gibench.baselines.image_to_image.frames import Frames
 from gibench.baselines.image_to_image.learner import IndirectLight, TrainingPlan
 from gibench.baselines.image_to_image.shading import brightness, demodulated
-from gibench.baselines.image_to_image.units import Units, area_light, flux
+from gibench.baselines.image_to_image.units import Units, flux
 from gibench.baselines.method import Training, View
 from gibench.baselines.stages import Stages
 from gibench.baselines.training import artifacts
@@ -124,7 +124,7 @@ def test_light_of_image_networks_is_in_units_of_what_the_light_gives_off(room):
     units = Units.of_frames(frames)
     assert not units.own
     examples = Examples(frames, units)
-    read = [(examples[k], area_light(frames, k)) for k in range(len(examples))]
+    read = [(examples[k], frames.area_light(k)) for k in range(len(examples))]
     found = [float(example["unit"]) / flux(area) for example, area in read]
     assert found == pytest.approx([units.in_view] * len(found))
     seen = [

@@ -19,7 +19,7 @@ def test_the_measure_of_a_room():
     light = (images["indirect_diffuse"] + images["indirect_specular"])[:2] / torch.tensor([4.0, 2.0])[
         :, None, None
     ]
-    assert found.indirect == pytest.approx(float(light.sum() / (3 * 20)), rel=1e-5)
+    assert found.indirect == pytest.approx(float(light.sum() / (3 * 20)) / AREA.area, rel=1e-5)
     assert Measure.of_facts(found.facts()) == found
     dark = {name: torch.zeros_like(image) for name, image in images.items()}
     assert Measure.of_frames([(dark, AREA)]) == Measure((0.0,) * 3, (1.0,) * 3, 1.0, 1.0)

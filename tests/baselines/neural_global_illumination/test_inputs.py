@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from gibench.baselines.moving_light.measure import CODE, Measure, per_radiance
+from gibench.baselines.moving_light.measure import CODE, Measure, per_flux, unit_of
 from gibench.baselines.neural_global_illumination.inputs import LIGHTING, assembled
 from gibench.baselines.neural_global_illumination.network import INPUTS
 from gibench.rendering.camera import PinholeCamera
@@ -51,7 +51,7 @@ def test_all_channels_are_where_the_network_has_them():
         towards = torch.tensor(there)[:, None, None] - images["position"]
         torch.testing.assert_close(found[name], towards / towards.norm(dim=0))
     direct = images["direct_diffuse"] + images["direct_specular"]
-    decoded = CODE.decode(found["direct"]) * MEASURE.direct * torch.tensor(AREA.radiance)[:, None, None]
+    decoded = CODE.decode(found["direct"]) * MEASURE.direct * unit_of(AREA)
     torch.testing.assert_close(decoded[:2], direct[:2], rtol=1e-4, atol=1e-5)
     assert not decoded[2].any()  # a light without blue
 
@@ -68,7 +68,7 @@ def test_a_brighter_light_is_the_same_light():
             assembled(lit, CAMERA, brighter, MEASURE, "all"), first, rtol=1e-4, atol=1e-5
         )
         indirect = images["indirect_diffuse"]
-        torch.testing.assert_close(per_radiance(scale * indirect, brighter), per_radiance(indirect, AREA))
+        torch.testing.assert_close(per_flux(scale * indirect, brighter), per_flux(indirect, AREA))
 
 
 @pytest.mark.parametrize("lighting", LIGHTING)
