@@ -105,7 +105,8 @@ def area_of(frames: Frames, index: int) -> AreaLight:
     area = frames.area_light(index)
     if area is None:
         raise TrainingError(
-            f"training frame {frames.rows.iloc[index]['file']} is not lit by an area light: make the dataset with --lighting area-light"
+            f"training frame {frames.rows.iloc[index]['file']} is not lit by an area light: make the dataset with "
+            "--lighting area-light"
         )
     return area
 
