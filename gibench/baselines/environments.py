@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from gibench.baselines.method import MethodError, View
 from gibench.rendering.lighting import EnvironmentMap
+from gibench.rendering.panoramas import Panorama
 
 SMALLEST_SHIFT = 1e-6
 """Of a column: whole turns, which leave dust in double precision, move nothing."""
@@ -23,6 +25,18 @@ def environment_of(view: View, method: str) -> EnvironmentMap:
             "run it on the track relight"
         )
     return environment
+
+
+def mean_radiance(panorama: Panorama) -> NDArray[np.float64]:
+    """(3,), over the sphere."""
+    return np.array(_mean(panorama))
+
+
+@lru_cache(maxsize=256)
+def _mean(panorama: Panorama) -> tuple[float, ...]:
+    rows = panorama.pixels.mean(axis=1, dtype=np.float64)
+    weight = np.sin(np.pi * (np.arange(len(rows)) + 0.5) / len(rows))
+    return tuple((weight @ rows / weight.sum()).tolist())
 
 
 def turned(panorama: NDArray[Any], rotation: float) -> NDArray[Any]:

@@ -11,8 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gibench.baselines.direct_light.tracer import DirectLight
+from gibench.baselines.environments import mean_radiance
 from gibench.baselines.method import MethodError, Prediction, Site, Training, View, reading
 from gibench.baselines.stages import Stages
+from gibench.rendering.lighting import Lighting
 
 CONSTANT = "ambient.json"
 
@@ -20,8 +22,9 @@ CONSTANT = "ambient.json"
 def fitted(frames: Iterable[tuple[NDArray[Any], NDArray[Any], float]]) -> NDArray[np.float64]:
     """The constant c (3,), W·m⁻²·sr⁻¹, that makes c · albedo most like indirect light, in the sense of least squares.
 
-    frames: indirect radiance (H, W, 3), albedo (H, W, 3) and exposure of each. Differences are of exposed radiance, so
-    that a frame that is lit a hundred times brighter does not decide alone. 0 where nothing has albedo.
+    frames: indirect radiance (H, W, 3), albedo (H, W, 3) times what the light gives off, and exposure of each.
+    Differences are of exposed radiance, so that a frame that is lit a hundred times brighter does not decide alone. 0
+    where nothing has albedo.
     """
     products, squares = np.zeros(3), np.zeros(3)
     for indirect, albedo, exposure in frames:
@@ -44,7 +47,8 @@ class AmbientLight(DirectLight):
                 read = frame.read("indirect_diffuse", "indirect_specular", "albedo")
                 indirect = read["indirect_diffuse"] + read["indirect_specular"]
                 exposure = float(frame.row["exposure"])
-                yield indirect, read["albedo"], exposure if np.isfinite(exposure) else 1.0
+                lit = read["albedo"] * light_of(frame.lighting)
+                yield indirect, lit, exposure if np.isfinite(exposure) else 1.0
 
         constant = fitted(parts())
         (training.folder / CONSTANT).write_text(json.dumps(constant.tolist()), encoding="utf-8")
@@ -59,8 +63,21 @@ class AmbientLight(DirectLight):
     def render(self, view: View, stages: Stages) -> Prediction:
         """Direct light, and the constant times albedo."""
         parts, albedo = self.images(view, stages)
-        ambient = albedo * type(albedo)(self._constant.astype(np.float32))
+        constant = self._constant * light_of(view.shot.lighting)
+        ambient = albedo * type(albedo)(constant.astype(np.float32))
         return Prediction(parts["full"] + ambient, indirect=ambient)
+
+
+def light_of(lighting: Lighting) -> NDArray[np.float64]:
+    """(3,), what the constant is multiplied by, for a brighter light makes a brighter room.
+
+    Radiance times area of an area light, W·sr⁻¹; mean radiance of an environment, W·m⁻²·sr⁻¹; 1 for the scene's own.
+    """
+    if lighting.area is not None:
+        return np.array(lighting.area.radiance) * lighting.area.area
+    if lighting.environment is not None:
+        return mean_radiance(lighting.environment.panorama)
+    return np.ones(3)
 
 
 def _read(folder: Path) -> NDArray[np.float64]:

@@ -19,7 +19,7 @@ from torch import Tensor
 
 from gibench.baselines.compositional_scene_representations.network import OBSERVATIONS, SIDE
 from gibench.baselines.image_to_image.device_frames import DeviceFrames, as_image
-from gibench.baselines.moving_light.measure import Measure, per_flux
+from gibench.baselines.moving_light.measure import FARTHEST, Measure, per_flux
 from gibench.baselines.path_traced.tracer import trace_rows
 from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.lighting import AreaLight
@@ -65,7 +65,11 @@ class Observed:
         found = []
         for camera in self.cameras:
             images = frames.read(camera, (SIDE, SIDE))
-            found.append(torch.cat([images["albedo"], images["normal"], images["distance"] / size]))
+            found.append(
+                torch.cat(
+                    [images["albedo"], images["normal"], (images["distance"] / size).clamp(max=2 * FARTHEST)]
+                )
+            )
         return torch.stack(found)
 
     def light(self, area: AreaLight, measure: Measure, seed: int) -> Tensor:

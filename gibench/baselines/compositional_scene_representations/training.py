@@ -13,7 +13,7 @@ from torch import Tensor
 from gibench.baselines.compositional_scene_representations.network import FULL, SMALL, Represented, Size
 from gibench.baselines.image_to_image.frames import Frames, Images
 from gibench.baselines.method import Setting
-from gibench.baselines.moving_light.kept import KeptExamples
+from gibench.baselines.moving_light.kept import KeptExamples, some_of, widened
 from gibench.baselines.moving_light.measure import Measure, area_of, per_flux, unit_vectors
 from gibench.baselines.training.batches import batches
 from gibench.baselines.training.budget import Budget
@@ -117,10 +117,10 @@ class Representing(Learner):
         with seeded(plan.seed):
             self.network = Represented(plan.size, fixed.cpu(), poses.cpu())
         self.network.generator.begin_at(
-            torch.stack([one.truth.mean(dim=(1, 2)) for one in judged]).mean(dim=0)
+            torch.stack([one.truth.mean(dim=(1, 2)) for one in some_of(examples)]).mean(dim=0)
         )
         self.network.to(device)
-        self.held_out = [Example(*(part.to(device) for part in one)) for one in judged]
+        self.held_out = [Example(*(part.to(device) for part in widened(one))) for one in judged]
         optimiser = torch.optim.Adam(self.network.parameters(), lr=RATES[plan.network])
         super().__init__({"network": self.network}, {"network": optimiser})
 
@@ -133,7 +133,7 @@ class Representing(Learner):
 
     def _crop(self, example: Example, random: np.random.Generator) -> Example:
         window = random_window(example.truth.shape[-2:], self.plan.crop, random)
-        return Example(example.light, window.of(example.pixels), window.of(example.truth))
+        return widened(Example(example.light, window.of(example.pixels), window.of(example.truth)))
 
     def error(self) -> Tensor:
         """Of what is held out: mean absolute difference of log1p."""

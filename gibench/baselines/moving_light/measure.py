@@ -10,7 +10,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import torch
+from numpy.typing import ArrayLike
 from torch import Tensor
 
 from gibench.baselines.image_to_image.frames import Frames, Images, spaced
@@ -27,7 +29,13 @@ MEASURED = 64
 FARTHEST = 2.0
 """Of places, in half sizes of the room; beyond, encodings repeat themselves."""
 
-HELD_OUT, JUDGED = 0.05, 8
+BESIDE = 1.25
+"""Half sizes of the room over those of the box of cameras and lights, which keep off its walls."""
+
+THINNEST = 0.1
+"""Least half size of the room, of its largest one: where cameras and lights lie in a plane."""
+
+HELD_OUT, JUDGED = 0.05, 32
 """Share of the training frames that is held out, and how many of these are looked at."""
 
 
@@ -35,7 +43,8 @@ HELD_OUT, JUDGED = 0.05, 8
 class Measure:
     """What numbers of a room are divided by.
 
-    centre, half: of the box of all places that training frames see, m. direct, indirect: mean of `per_flux`.
+    centre, half: of a box around all places of cameras and lights, m. Places that are seen say little of the room: a
+    window shows ground that lies a kilometre away. direct, indirect: mean of `per_flux`.
     """
 
     centre: tuple[float, float, float]
@@ -50,8 +59,17 @@ class Measure:
 
     def inside(self, points: Tensor) -> Tensor:
         """Places (3, H, W), m, in half sizes of the room from its middle, to FARTHEST at most."""
-        centre, half = (points.new_tensor(side)[:, None, None] for side in (self.centre, self.half))
+        centre, half = self._box(points)
         return ((points - centre) / half).clamp(-FARTHEST, FARTHEST)
+
+    def nearest(self, points: Tensor) -> Tensor:
+        """Places (3, H, W), m; those farther than FARTHEST half sizes are moved there."""
+        centre, half = self._box(points)
+        return torch.minimum(torch.maximum(points, centre - FARTHEST * half), centre + FARTHEST * half)
+
+    def _box(self, points: Tensor) -> tuple[Tensor, Tensor]:
+        centre, half = (points.new_tensor(side)[:, None, None] for side in (self.centre, self.half))
+        return centre, half
 
     @staticmethod
     def of_facts(facts: Mapping[str, Any]) -> Measure:
@@ -60,26 +78,19 @@ class Measure:
         return Measure(centre, half, float(facts["direct"]), float(facts["indirect"]))  # type: ignore[arg-type]
 
     @staticmethod
-    def of_frames(frames: Sequence[tuple[Images, AreaLight]]) -> Measure:
-        """From frames with positions, reflected ones where they have them, direct and indirect light."""
-        lowest, highest = torch.full((3,), torch.inf), torch.full((3,), -torch.inf)
+    def of_frames(places: ArrayLike, frames: Sequence[tuple[Images, AreaLight]]) -> Measure:
+        """From the places (N, 3) of all cameras and lights, m, and frames with direct and indirect light."""
+        inside = np.asarray(places, np.float64)
+        lowest, highest = inside.min(axis=0), inside.max(axis=0)
+        half = BESIDE * (highest - lowest) / 2
+        half = np.maximum(half, THINNEST * half.max()) if half.any() else np.ones(3)
+        centre = (lowest + highest) / 2
         sums = torch.zeros(2, dtype=torch.float64)
         for images, area in frames:
-            for name in ("position", "reflected_position"):
-                if name not in images:
-                    continue
-                places = images[name].flatten(1)
-                hit = (places != 0).any(dim=0)
-                if hit.any():
-                    lowest = torch.minimum(lowest, places[:, hit].amin(dim=1))
-                    highest = torch.maximum(highest, places[:, hit].amax(dim=1))
             for number, kind in enumerate(("direct", "indirect")):
                 light = images[f"{kind}_diffuse"] + images[f"{kind}_specular"]
                 # Highlights of near-mirrors would set the scale alone.
                 sums[number] += per_radiance(light, area).clamp(max=1).double().mean() / area.area
-        empty = ~(highest > lowest).all()
-        centre = torch.zeros(3) if empty else (lowest + highest) / 2
-        half = torch.ones(3) if empty else ((highest - lowest) / 2).clamp(min=1e-3)
         means = [float(total) / max(len(frames), 1) or 1.0 for total in sums]
         return Measure(tuple(centre.tolist()), tuple(half.tolist()), *means)
 
@@ -118,6 +129,7 @@ def unit_vectors(vectors: Tensor) -> Tensor:
 
 
 def measured(frames: Frames) -> Measure:
-    """The measure of a room, by MEASURED of its training frames."""
-    some = spaced(range(len(frames)), MEASURED)
-    return Measure.of_frames([(frames[k], area_of(frames, k)) for k in some])
+    """The measure of a room, by the places of all of its training frames and the light of MEASURED of them."""
+    numbers = range(len(frames))
+    places = [place for k in numbers for place in (frames.camera(k).position, area_of(frames, k).centre)]
+    return Measure.of_frames(places, [(frames[k], area_of(frames, k)) for k in spaced(numbers, MEASURED)])

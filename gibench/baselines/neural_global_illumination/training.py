@@ -12,7 +12,7 @@ from torch import Tensor
 
 from gibench.baselines.image_to_image.frames import Frames
 from gibench.baselines.method import Setting
-from gibench.baselines.moving_light.kept import KeptExamples
+from gibench.baselines.moving_light.kept import KeptExamples, some_of, widened
 from gibench.baselines.moving_light.measure import CODE, Measure, area_of, per_flux, unit_of
 from gibench.baselines.neural_global_illumination.inputs import assembled
 from gibench.baselines.neural_global_illumination.network import FULL, SMALL, NeuralGlobalIllumination, Size
@@ -121,10 +121,13 @@ class Predicting(Learner):
         self.examples, self.plan = examples, plan
         with seeded(plan.seed):
             self.network = NeuralGlobalIllumination(plan.size)
-        self.network.begin_at(torch.stack([one.code.mean(dim=(1, 2)) for one in judged]).mean(dim=0))
+        self.network.begin_at(
+            torch.stack([one.code.mean(dim=(1, 2)) for one in some_of(examples)]).mean(dim=0)
+        )
         self.network.to(device)
-        self.held_out = [Example(*(part.to(device) for part in one)) for one in judged]
+        self.held_out = [Example(*(part.to(device) for part in widened(one))) for one in judged]
         self.lpips = Lpips().to(device) if plan.lpips else None
+        self.anew_at = PERCEPTUAL_FROM if plan.lpips else 0.0
         optimiser = torch.optim.Adam(self.network.parameters(), lr=RATES[plan.network])
         super().__init__({"network": self.network}, {"network": optimiser})
 
@@ -138,7 +141,7 @@ class Predicting(Learner):
     def _crop(self, example: Example, random: np.random.Generator) -> Example:
         window = random_window(example.code.shape[-2:], self.plan.crop, random)
         inputs, code, rest, shown = example
-        return Example(window.of(inputs), window.of(code), window.of(rest), shown)
+        return widened(Example(window.of(inputs), window.of(code), window.of(rest), shown))
 
     def error(self) -> Tensor:
         """The mean absolute difference of codes over the held-out frames."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from gibench.baselines.linearly_transformed_cosines import SHADOWS
-from gibench.baselines.method import Knob, Method
+from gibench.baselines.method import Knob, Method, Variant
 from gibench.baselines.moving_light import LIT, SURFACE
 
 METHOD = Method(
@@ -16,9 +16,11 @@ METHOD = Method(
     channels=(*LIT, *SURFACE),
     knobs=(
         Knob("cells", 1024, (16, 64, 256, 1024), "parts of the room, a network of 52 kB each", trains=True),
+        Knob("facing", False, (False, True), "whether networks are told where the light faces", trains=True),
         *SHADOWS,
     ),
     budget="shadow_rays",
     trains=True,
+    variants=(Variant("facing", {"facing": True}),),
 )
 """The method `rrf`: indirect light by networks, direct light by linearly transformed cosines."""

@@ -13,7 +13,7 @@ from gibench.baselines.moving_light import SURFACE
 from gibench.baselines.moving_light.lit_frames import LitFrames
 from gibench.baselines.moving_light.measure import HELD_OUT, JUDGED, Measure, measured, unit_of
 from gibench.baselines.radiance_regression import METHOD
-from gibench.baselines.radiance_regression.network import CellNetworks
+from gibench.baselines.radiance_regression.network import FACING, PLACE, REST, CellNetworks
 from gibench.baselines.radiance_regression.partition import Partition
 from gibench.baselines.radiance_regression.training import (
     Regressing,
@@ -43,6 +43,7 @@ class RegressedLight:
     def adjust(self, settings: Mapping[str, Setting]) -> None:
         """Take other settings that do not train."""
         self.settings = dict(settings)
+        self._facing = bool(settings["facing"])
 
     def train(self, training: Training) -> float:
         """Split the room and learn its parts. Returns seconds that were spent before."""
@@ -51,10 +52,10 @@ class RegressedLight:
             Frames(views, METHOD.channels, numbers) for numbers in held_out(views, HELD_OUT, JUDGED)
         )
         measure = measured(learned)
-        points = all_points(learned, measure, training.seed)
+        points = all_points(learned, measure, training.seed, self._facing)
         partition = room_of(points, int(self.settings["cells"]))
         most = 1 << 62
-        apart = [points_of(judged, k, measure, most, training.seed) for k in range(len(judged))]
+        apart = [points_of(judged, k, measure, most, training.seed, self._facing) for k in range(len(judged))]
         learner = Regressing(
             points, partition, apart, seed=training.seed, seconds=training.seconds, device=torch_device()
         )
@@ -72,7 +73,7 @@ class RegressedLight:
         with reading("the trained networks", site.weights):
             weights, facts = artifacts.kept(site.weights)
             partition = Partition(**weights["partition"])
-            self.networks = CellNetworks(partition.cells)
+            self.networks = CellNetworks(partition.cells, PLACE + REST + FACING * self._facing)
             self.networks.load_state_dict(weights["cells"])
             self.measure = Measure.of_facts(facts)
         self.networks.eval().requires_grad_(False).to(torch_device())
@@ -84,7 +85,7 @@ class RegressedLight:
         area = area_light(view, "rrf")
         frame = self._frames.read(view, area, self.settings, stages)
         with stages.stage("inference"), torch.inference_mode():
-            place, rest = described(frame.images, view.camera, area, self.measure)
+            place, rest = described(frame.images, view.camera, area, self.measure, self._facing)
             seen = (frame.images["normal"] != 0).any(dim=0).flatten().nonzero()[:, 0]
             light = torch.zeros_like(place).flatten(1)
             for some in seen.split(AT_ONCE):

@@ -11,8 +11,10 @@ import torch
 from torch import Tensor, nn
 from torch.nn.functional import relu
 
-INPUTS = 19
-"""Place in the part, normal, direction to the viewer, centre of the light (3 each), and material (7)."""
+PLACE, REST, FACING = 3, 16, 3
+"""Inputs: place in the part; normal, direction to the viewer, centre of the light (3 each) and material (7); where the
+light faces, for networks that are told it.
+"""
 
 WIDTHS = (128, 64, 32)
 """Of the hidden layers."""
@@ -28,12 +30,13 @@ AT_ONCE = 1 << 16
 
 
 class CellNetworks(nn.Module):
-    """A network for each cell, from INPUTS numbers to a code of radiance."""
+    """A network for each cell, from so many numbers to a code of radiance."""
 
-    def __init__(self, cells: int) -> None:
-        """cells: how many."""
+    def __init__(self, cells: int, inputs: int = PLACE + REST) -> None:
+        """cells: how many. inputs: of each."""
         super().__init__()
-        widths = (INPUTS, *WIDTHS, 3)
+        self.inputs = inputs
+        widths = (inputs, *WIDTHS, 3)
         self.weights = nn.ParameterList()
         self.biases = nn.ParameterList()
         for layer, (before, after) in enumerate(pairwise(widths)):
@@ -48,7 +51,7 @@ class CellNetworks(nn.Module):
             self.biases[-1].copy_(codes[:, None])
 
     def forward(self, rows: Tensor, cells: Tensor | None = None) -> Tensor:
-        """Codes (B, R, 3) of rows (B, R, INPUTS). cells: (B,), of which cell; all of them in order by default."""
+        """Codes (B, R, 3) of rows (B, R, inputs). cells: (B,), of which cell; all of them in order by default."""
         last = len(self.weights) - 1
         for layer, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
             if cells is not None:
@@ -59,7 +62,7 @@ class CellNetworks(nn.Module):
         return rows
 
     def of_pairs(self, inputs: Tensor, cells: Tensor) -> Tensor:
-        """Codes (P, 3) of single points (P, INPUTS), each of a cell (P,), in any order."""
+        """Codes (P, 3) of single points (P, inputs), each of a cell (P,), in any order."""
         codes = inputs.new_zeros(len(inputs), 3)
         order = torch.argsort(cells, stable=True)
         for part in order.split(AT_ONCE):
@@ -69,14 +72,14 @@ class CellNetworks(nn.Module):
             starts = (blocks.cumsum(0) - blocks) * ROWS
             before = counts.cumsum(0) - counts
             place = torch.arange(len(part), device=part.device) + (starts - before).repeat_interleave(counts)
-            rows = inputs.new_zeros(int(blocks.sum()) * ROWS, INPUTS)
+            rows = inputs.new_zeros(int(blocks.sum()) * ROWS, self.inputs)
             rows[place] = inputs[part]
-            out = self(rows.reshape(-1, ROWS, INPUTS), found.repeat_interleave(blocks))
+            out = self(rows.reshape(-1, ROWS, self.inputs), found.repeat_interleave(blocks))
             codes[part] = out.reshape(-1, 3)[place]
         return codes
 
 
-def parameters_of_a_cell() -> int:
+def parameters_of_a_cell(inputs: int = PLACE + REST) -> int:
     """12,995 numbers, 51,980 bytes."""
-    widths = (INPUTS, *WIDTHS, 3)
+    widths = (inputs, *WIDTHS, 3)
     return sum((before + 1) * after for before, after in pairwise(widths))

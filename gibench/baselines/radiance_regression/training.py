@@ -12,7 +12,7 @@ from torch import Tensor
 
 from gibench.baselines.image_to_image.frames import Frames, Images
 from gibench.baselines.moving_light.measure import CODE, Measure, area_of, per_flux, unit_vectors
-from gibench.baselines.radiance_regression.network import CellNetworks
+from gibench.baselines.radiance_regression.network import PLACE, CellNetworks
 from gibench.baselines.radiance_regression.partition import Pairs, Partition, partitioned
 from gibench.baselines.training.budget import Budget
 from gibench.baselines.training.checkpoints import Checkpoint
@@ -45,7 +45,7 @@ POINT_LANE = 6
 
 
 class Points(NamedTuple):
-    """Surface points under a light. place: (M, 3), m. rest: what else the networks are given, (M, 16). code: of
+    """Surface points under a light. place: (M, 3), m. rest: what else the networks are given, (M, 16 or 19). code: of
     indirect light, (M, 3).
     """
 
@@ -55,21 +55,25 @@ class Points(NamedTuple):
 
 
 def described(
-    images: Images, camera: PinholeCamera, area: AreaLight, measure: Measure
+    images: Images, camera: PinholeCamera, area: AreaLight, measure: Measure, facing: bool
 ) -> tuple[Tensor, Tensor]:
-    """Places (3, H, W), m, and all other inputs, (16, H, W): normal, view, light centre, material."""
+    """Places (3, H, W), m, and all other inputs, (16 or 19, H, W): normal, view, light centre, material, and where the
+    light faces if `facing`. What is seen far away counts as near: it would take parts of the room for itself.
+    """
     place = images["position"]
     eye = place.new_tensor(camera.position)[:, None, None]
     centre = place.new_tensor(area.centre)[:, None, None].expand_as(place)
     parts = [images["normal"], unit_vectors(eye - place), measure.inside(centre)]
     parts += [images[name] for name in ("albedo", "specular_albedo", "roughness")]
-    return place, torch.cat(parts)
+    if facing:
+        parts.append(place.new_tensor(area.direction)[:, None, None].expand_as(place))
+    return measure.nearest(place), torch.cat(parts)
 
 
-def points_of(frames: Frames, index: int, measure: Measure, most: int, seed: int) -> Points:
+def points_of(frames: Frames, index: int, measure: Measure, most: int, seed: int, facing: bool) -> Points:
     """Surface points of a frame, `most` of them at most."""
     images, area = frames[index], area_of(frames, index)
-    place, rest = described(images, frames.camera(index), area, measure)
+    place, rest = described(images, frames.camera(index), area, measure, facing)
     indirect = images["indirect_diffuse"] + images["indirect_specular"]
     code = CODE.encode(per_flux(indirect, area) / measure.indirect)
     seen = (images["normal"] != 0).any(dim=0).flatten().nonzero()[:, 0]
@@ -79,10 +83,10 @@ def points_of(frames: Frames, index: int, measure: Measure, most: int, seed: int
     return Points(*(part.flatten(1)[:, seen].T.contiguous() for part in (place, rest, code)))
 
 
-def all_points(frames: Frames, measure: Measure, seed: int) -> Points:
+def all_points(frames: Frames, measure: Measure, seed: int, facing: bool) -> Points:
     """Of all frames, KEPT of them at most; what is no place is kept in half precision."""
     most = max(KEPT // len(frames), 1)
-    found = [points_of(frames, index, measure, most, seed) for index in range(len(frames))]
+    found = [points_of(frames, index, measure, most, seed, facing) for index in range(len(frames))]
     place = torch.cat([points.place for points in found])
     return Points(place, *(torch.cat([points[k].half() for points in found]) for k in (1, 2)))
 
@@ -94,7 +98,7 @@ def room_of(points: Points, cells: int) -> Partition:
 
 
 def inputs_of(partition: Partition, place: Tensor, rest: Tensor, cells: Tensor) -> Tensor:
-    """Rows for networks, (…, 19), of places and of what else is given, in their cells (…)."""
+    """Rows for networks, (…, 19 or 22), of places and of what else is given, in their cells (…)."""
     local = (place - partition.centre[cells]) / partition.half[cells]
     return torch.cat([local.clamp(-2, 2), rest], dim=-1)
 
@@ -143,7 +147,7 @@ class Regressing(Learner):
         self.sorted = Sorted.of(partition.pairs(points.place), partition.cells)
         self.partition = partition.to(device)
         with seeded(seed):
-            networks = CellNetworks(partition.cells)
+            networks = CellNetworks(partition.cells, PLACE + points.rest.shape[-1])
         networks.begin_at(self._means())
         self.cells = networks.to(device)
         self.judged = [Points(*(part.to(device) for part in one)) for one in judged]

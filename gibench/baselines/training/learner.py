@@ -36,6 +36,11 @@ class Learner(ABC):
     goes into `state` and `load_state`. Then a training that was cut off goes on to the same weights.
     """
 
+    anew_at = 0.0
+    """Progress at which another loss sets in. Weights of before are given up for those after it, even where these have
+    a larger held-out error: it may not know what the new loss is for.
+    """
+
     def __init__(
         self,
         networks: Mapping[str, nn.Module],

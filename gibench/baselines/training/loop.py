@@ -81,6 +81,7 @@ class _Run:
         self.step = 0
         self.plans: list[Plan] = []
         self.planned_at = 0.0  # progress at the last plan
+        self.best_at = 0.0  # progress at the best look
         self.plan_again = PLANNED_FROM  # progress, by the clock or by steps, at which steps are planned next
         self.seconds = self.before = self.waited = 0.0
         self.curve: list[Look] = []
@@ -214,8 +215,10 @@ class _Run:
         total, count = self.sums
         self.sums = [0.0, 0]
         look = Look(self.step, ended - self.started, error, total / count if count else 0.0)
-        if not self.curve or error < self.best.error:
-            self.best, self.weights = look, self.learner.weights()
+        progress = self._progress()
+        anew = self.best_at < self.learner.anew_at <= progress
+        if not self.curve or error < self.best.error or anew:
+            self.best, self.best_at, self.weights = look, progress, self.learner.weights()
         self.curve.append(look)
 
     def _read(self, write: Write) -> bool:
@@ -303,5 +306,5 @@ class _Run:
             raise CheckpointError(unreadable(self.checkpoint.path, problem)) from problem
 
 
-_NUMBERS = ("step", "planned_at", "plan_again", "seconds", "waited", "ended", "a_look")
+_NUMBERS = ("step", "planned_at", "plan_again", "best_at", "seconds", "waited", "ended", "a_look")
 """Attributes of a run that a checkpoint keeps."""

@@ -12,7 +12,7 @@ from gibench.baselines.compositional_scene_representations.training import (
     TrainingPlan,
     described,
 )
-from gibench.baselines.moving_light.kept import KeptExamples
+from gibench.baselines.moving_light.kept import KeptExamples, widened
 from gibench.baselines.training.batches import batches
 from gibench.baselines.training.budget import Budget
 from gibench.baselines.training.loop import train
@@ -60,7 +60,8 @@ def test_examples_are_put_together_once(monkeypatch):
     assert made.times == 1
     for one, other in zip(first, again, strict=True):
         assert torch.equal(one, other)
-        assert one.dtype == torch.float32
+    assert first.pixels.dtype == first.truth.dtype == torch.float16
+    assert {part.dtype for part in widened(first)} == {torch.float32}
     monkeypatch.setattr("gibench.baselines.moving_light.kept.KEPT", 0)
     made = Made()
     assert all(torch.equal(one, other) for one, other in zip(made[2], made[2], strict=True))

@@ -103,7 +103,7 @@ def images(rig):
 def test_inputs_and_truth_are_finite(images):
     assert not images["albedo"].any()
     indirect = images["indirect_diffuse"] + images["indirect_specular"]
-    measure = Measure.of_frames([(images, LIGHT)])
+    measure = Measure.of_frames([CAMERA.position, LIGHT.centre], [(images, LIGHT)])
     assert measure.indirect > 0
     assert CODE.encode(per_flux(indirect, LIGHT) / measure.indirect).isfinite().all()
     assert assembled(images, CAMERA, LIGHT, measure, "all").isfinite().all()
@@ -111,8 +111,8 @@ def test_inputs_and_truth_are_finite(images):
 
 
 def test_networks_of_parts_learn_there(images):
-    measure = Measure.of_frames([(images, LIGHT)])
-    place, rest = regressing.described(images, CAMERA, LIGHT, measure)
+    measure = Measure.of_frames([CAMERA.position, LIGHT.centre], [(images, LIGHT)])
+    place, rest = regressing.described(images, CAMERA, LIGHT, measure, True)
     indirect = images["indirect_diffuse"] + images["indirect_specular"]
     code = CODE.encode(per_flux(indirect, LIGHT) / measure.indirect)
     points = regressing.Points(*(part.flatten(1).T.contiguous() for part in (place, rest, code)))

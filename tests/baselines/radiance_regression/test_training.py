@@ -107,8 +107,11 @@ def test_light_is_continuous_across_parts():
 
 def test_inputs_in_closed_form():
     images = frame()
-    place, rest = described(images, CAMERA, AREA, MEASURE)
+    place, rest = described(images, CAMERA, AREA, MEASURE, False)
     assert torch.equal(place, images["position"])
+    told = described(images, CAMERA, AREA, MEASURE, True)[1]
+    assert torch.equal(told[:16], rest)
+    assert told[16:, 2, 3].tolist() == list(AREA.direction)
     normal, view, centre, albedo, specular, roughness = rest.split([3, 3, 3, 3, 3, 1])
     assert torch.equal(normal, images["normal"])
     towards = torch.tensor(CAMERA.position)[:, None, None] - place
@@ -122,6 +125,29 @@ def test_inputs_in_closed_form():
     rows = inputs_of(partition, partition.centre[cells], points.rest[:2], cells)
     assert rows.shape == (2, 19)
     assert not rows[:, :3].any()
+
+
+def test_what_is_far_away_counts_as_near():
+    """The ground outside of a window takes no part of the room for itself."""
+    images = frame()
+    images["position"][:, 0, 0] = torch.tensor([1000.0, -1000.0, 0.5])
+    place, _ = described(images, CAMERA, AREA, MEASURE, False)
+    assert place[:, 0, 0].tolist() == [4, -4, 0.5]
+    assert torch.equal(place[:, 1:], images["position"][:, 1:])
+
+
+def test_which_way_a_light_faces_can_be_learned():
+    """Two lights at one place, one of them facing up: the same to networks that are not told."""
+    points = made()
+    up = torch.arange(len(points.place)) % 2 == 0
+    code = torch.where(up, -0.5, -0.9)[:, None].expand(-1, 3)
+    facing = torch.where(up, 1.0, -1.0)[:, None] * torch.tensor([[0.0, 0.0, 1.0]])
+    left = []
+    for rest in (points.rest, torch.cat([points.rest, facing.to(points.rest.dtype)], dim=1)):
+        lit = Points(points.place, rest, code)
+        one = Regressing(lit, partitioned(lit.place, lit.code, 4), [lit], seed=3, seconds=1.0)
+        left.append(train(one, one.batches, Budget(steps=60, look_every=60), seed=3).best.error)
+    assert left[1] < 0.3 * left[0]
 
 
 def test_a_larger_and_dimmer_light_is_the_same_light():
@@ -149,12 +175,12 @@ def test_points_of_a_frame_are_those_that_are_seen(monkeypatch):
             return CAMERA
 
     monkeypatch.setattr(training, "area_of", lambda frames, index: AREA)
-    whole = training.points_of(One(), 0, MEASURE, 1000, 0)
+    whole = training.points_of(One(), 0, MEASURE, 1000, 0, False)
     assert len(whole.place) == 56
-    few = training.points_of(One(), 0, MEASURE, 10, 0)
+    few = training.points_of(One(), 0, MEASURE, 10, 0, False)
     assert few.place.shape == (10, 3)
     assert (few.place[:, None] == whole.place[None]).all(dim=2).any(dim=1).all()
-    assert torch.equal(training.points_of(One(), 0, MEASURE, 10, 0).place, few.place)
+    assert torch.equal(training.points_of(One(), 0, MEASURE, 10, 0, False).place, few.place)
     assert isinstance(MEASURE, Measure)
 
 

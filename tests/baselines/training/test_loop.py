@@ -314,6 +314,15 @@ def test_looks_that_take_long_are_few(clock):
     assert trained.seconds == pytest.approx(5.0, abs=0.25)
 
 
+def test_weights_of_before_another_loss_are_given_up():
+    """The held-out error falls to 2, but is 7, 6 and 8 once the other loss has set in."""
+    errors = iter([9.0, 8, 7, 6, 5, 4, 3, 2, 7, 6, 8])
+    learner = Fit()
+    learner.anew_at, learner.error = 0.8, lambda: next(errors)
+    trained = train(learner, points(), Budget(steps=10, look_every=1), seed=0)
+    assert (trained.best.step, trained.best.error) == (9, 6)
+
+
 def test_patience_ends_it():
     learner = Fit(rate=0.0)
     trained = train(learner, points(), Budget(steps=1000, look_every=5, patience=20), seed=0)
