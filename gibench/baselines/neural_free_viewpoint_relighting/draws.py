@@ -16,10 +16,16 @@ from torch import Tensor
 from gibench.baselines.relighting.examples import CODE, Example, Light, Seen, evenly, some_of
 from gibench.baselines.relighting.surfaces import MATERIAL
 from gibench.baselines.wavelets.light import chosen_light, light_at
-from gibench.baselines.wavelets.selection import largest
+from gibench.baselines.wavelets.selection import Weighting, largest
 
 CELLS = 64
 """Along each side of the grid in which light is compared between views."""
+
+WEIGHTING: Weighting = "area"
+"""By which the largest wavelets of a step are chosen, and those of a frame by default."""
+
+NEXT = 200
+"""Wavelets that come after the largest ones of a step: of which frames of more wavelets than a step has are made."""
 
 
 class Disagreement:
@@ -60,7 +66,9 @@ def _cells(points: Tensor) -> NDArray[np.int64]:
 class Draw:
     """Draws what a step sees of a frame (section 5).
 
-    pixels: how many. learned: how many wavelets, half of them the largest of the light, half of them any others.
+    pixels: how many. learned: how many wavelets, half of them the largest of the light times their area, a quarter of
+    them of the NEXT ones, a quarter any others. What is learned must explain all of the light of a frame, and light of
+    low frequency is most of that of a matt surface: so what a step is told of must hold it.
     disagreement: None to look at all pixels alike; otherwise a quarter of them is drawn so, and a quarter each by
     disagreement, by detail, and by how much and how sharply a surface reflects.
     """
@@ -82,9 +90,12 @@ class Draw:
     def _places(self, coefficients: NDArray[np.float64], random: np.random.Generator) -> NDArray[np.int64]:
         count = coefficients[..., 0].size
         learned = min(self.learned, count)
-        first = largest(coefficients, max(1, learned // 2))
-        rest = np.setdiff1d(np.arange(count), first, assume_unique=True)
-        return np.concatenate([first, random.choice(rest, learned - len(first), replace=False)])
+        first = max(1, learned // 2)
+        further = min((learned - first) // 2, count - first)
+        in_order = largest(coefficients, min(first + max(NEXT, further), count), WEIGHTING)
+        chosen = np.concatenate([in_order[:first], random.choice(in_order[first:], further, replace=False)])
+        rest = np.setdiff1d(np.arange(count), chosen, assume_unique=True)
+        return np.concatenate([chosen, random.choice(rest, learned - len(chosen), replace=False)])
 
     def _drawn(self, seen: Seen, random: np.random.Generator) -> NDArray[np.int64]:
         count = len(seen.points)
@@ -112,4 +123,4 @@ def spread(example: tuple[Seen, Light], pixels: int, wavelets: int) -> Example:
     """Pixels of a frame, evenly, and the wavelets that a frame is made from: what a training is judged by."""
     seen, coefficients = example
     truth, *surface = some_of(seen, evenly(seen, pixels))
-    return Example(truth, (*surface, *map(torch.from_numpy, chosen_light(coefficients, wavelets, "area"))))
+    return Example(truth, (*surface, *map(torch.from_numpy, chosen_light(coefficients, wavelets, WEIGHTING))))
