@@ -37,7 +37,7 @@ class Examples:
         return len(self.frames)
 
     def __getitem__(self, index: int) -> Images:
-        """READ of a frame (C, H, W), "exposure" and "unit" (1, 1, 1)."""
+        """READ of a frame (C, H, W), "exposure" (1, 1, 1) and "unit" (1 or 3, 1, 1)."""
         images = in_camera_space(self.frames[index], self.frames.camera(index))
         light = demodulated(images["direct_diffuse"], images["albedo"])
         unit = self.units.of(light, self.frames.area_light(index))
@@ -45,7 +45,7 @@ class Examples:
 
 
 def inputs_of(example: Images) -> Images:
-    """direct, truth, albedo (3, H, W), radiance; geometry; unit of light and exposure (1, 1, 1). Of a whole frame."""
+    """direct, truth, albedo (3, H, W), radiance; geometry; exposure (1, 1, 1); unit (1 or 3, 1, 1). Of whole frames."""
     return {
         "direct": example["direct_diffuse"],
         "truth": example[TRUTH],

@@ -11,7 +11,7 @@ from torch import Tensor, nn
 
 from gibench.baselines.image_to_image.examples import STOPS, Draw, Examples, inputs_of
 from gibench.baselines.image_to_image.frames import Images
-from gibench.baselines.image_to_image.shading import LIGHT, OUTPUT, Inputs, demodulated
+from gibench.baselines.image_to_image.shading import LIGHT, OUTPUT, Inputs, demodulated, in_units
 from gibench.baselines.method import Setting
 from gibench.baselines.training.batches import batches
 from gibench.baselines.training.crops import random_window
@@ -126,9 +126,10 @@ class IndirectLight(Learner):
         with mixed(self.device, pays=self.mixed):
             code = self.network(inputs.light, inputs.geometry)
         light = OUTPUT.decode(code.float())
-        # Where its unit is 0, no direct light being in view, nothing can be learned: what comes out is black.
+        # Where its unit is 0, no light being in view or none of a colour, nothing is learned: what comes out is black.
         lit = inputs.unit > 0
-        truth = demodulated(batch["truth"], inputs.albedo) / torch.where(lit, inputs.unit, 1)
+        light = torch.where(lit, light, light.detach())
+        truth = in_units(demodulated(batch["truth"], inputs.albedo), inputs.unit)
         truth = torch.where(lit, truth, light.detach())
         made, true = torch.log1p(light), torch.log1p(truth)
         content = smooth_absolute(made, true)

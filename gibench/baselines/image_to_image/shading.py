@@ -47,6 +47,11 @@ def brightness(direct: Tensor) -> Tensor:
     return direct.mean(dim=(-3, -2, -1), keepdim=True)
 
 
+def in_units(light: Tensor, unit: Tensor) -> Tensor:
+    """Light (…, 3, H, W) over its unit (…, 1 or 3, 1, 1); 0 where that is 0."""
+    return torch.where(unit > 0, light / torch.where(unit > 0, unit, 1), 0)
+
+
 def geometry(images: Images) -> Tensor:
     """(…, GEOMETRY, H, W) of images in camera space, lengths in units of the mean depth of what is hit."""
     depth = images["depth"]
@@ -60,8 +65,9 @@ def geometry(images: Images) -> Tensor:
 class Inputs:
     """What a network is given of frames. light: (N, LIGHT, 3, H, W), compressed direct light over albedo, and albedo.
 
-    geometry: (N, GEOMETRY, H, W). unit: (N, 1, 1, 1), of the light: where it is the mean of what is in view and that is
-    0, what comes out is black, for light is linear. albedo: (N, 3, H, W).
+    geometry: (N, GEOMETRY, H, W). unit: (N, 1, 1, 1), of the light, or (N, 3, 1, 1), of each colour: where it is 0, no
+    light being in view or a lamp having nothing of a colour, what comes out is black, for light is linear. albedo:
+    (N, 3, H, W).
     """
 
     light: Tensor
@@ -71,9 +77,8 @@ class Inputs:
 
     @staticmethod
     def of(direct: Tensor, albedo: Tensor, geometry: Tensor, unit: Tensor) -> Inputs:
-        """direct: direct diffuse radiance (N, 3, H, W), ≥ 0. unit: (N, 1, 1, 1), ≥ 0."""
-        light = demodulated(direct, albedo)
-        light = torch.log1p(light / torch.where(unit > 0, unit, 1))
+        """direct: direct diffuse radiance (N, 3, H, W), ≥ 0. unit: (N, 1 or 3, 1, 1), ≥ 0."""
+        light = torch.log1p(in_units(demodulated(direct, albedo), unit))
         return Inputs(torch.stack([light, albedo], dim=1), geometry, unit, albedo)
 
     def radiance(self, code: Tensor) -> Tensor:
@@ -91,7 +96,7 @@ def indirect(
     """Indirect diffuse radiance (N, 3, H, W), finite and ≥ 0.
 
     network: of (light, geometry) as in `Inputs`, gives logarithms. direct: direct diffuse radiance (N, 3, H, W), ≥ 0.
-    geometry: (N, GEOMETRY, H, W). unit: of light over albedo, (N, 1, 1, 1), its mean by default.
+    geometry: (N, GEOMETRY, H, W). unit: of light over albedo, (N, 1 or 3, 1, 1), its mean by default.
     """
     if unit is None:
         unit = brightness(demodulated(direct, albedo))

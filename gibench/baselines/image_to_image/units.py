@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import torch
 from torch import Tensor
 
 from gibench.baselines.image_to_image.frames import Frames, spaced
-from gibench.baselines.image_to_image.shading import brightness, demodulated
+from gibench.baselines.image_to_image.shading import brightness, demodulated, in_units
+from gibench.baselines.moving_light.measure import unit_of
 from gibench.rendering.lighting import AreaLight
 
 MEASURED = 64
@@ -17,13 +17,13 @@ MEASURED = 64
 
 @dataclass(frozen=True)
 class Units:
-    """Of a room that an area light lights: what that gives off, times a constant of the room. Of others: the mean of a
-    frame's own direct light.
+    """Of a room that an area light lights: what that gives off in each colour, times a constant of the room. Of others:
+    the mean of a frame's own direct light, all colours together.
 
     The mean direct light in view says little where the light moves: in a living room whose indirect light varies by a
     factor of 7, light and light in view are apart by 10⁷, and one frame of fifteen sees no direct light at all.
 
-    in_view: mean direct light over albedo, over `flux`; None without area lights.
+    in_view: mean direct light over albedo, over radiance times area (W·sr⁻¹); None without area lights.
     """
 
     in_view: float | None = None
@@ -39,22 +39,19 @@ class Units:
                 return Units()
             images = frames[number]
             light = demodulated(images["direct_diffuse"], images["albedo"])
-            shares.append(float(brightness(light)) / flux(area))
-        mean = sum(shares) / len(shares)
+            given = unit_of(area).to(light)
+            if (given > 0).any():
+                shares.append(float(in_units(light, given)[(given > 0).flatten()].mean()))
+        mean = sum(shares) / max(len(shares), 1)
         return Units(mean) if mean > 0 else Units()
 
     def of(self, light: Tensor, area: AreaLight | None) -> Tensor:
-        """(…, 1, 1, 1) of direct light over albedo (…, 3, H, W). area: the light of the frame."""
+        """Of direct light over albedo (3, H, W): (3, 1, 1), or its mean (1, 1, 1). area: the light of the frame."""
         if self.in_view is None or area is None:
             return brightness(light)
-        return torch.full_like(brightness(light), self.in_view * flux(area))
+        return self.in_view * unit_of(area).to(light)
 
     @property
     def own(self) -> bool:
         """Whether they are a frame's own, so that nobody knows how bright a room is."""
         return self.in_view is None
-
-
-def flux(area: AreaLight) -> float:
-    """Mean radiance of the colours times area, W·sr⁻¹; 1 for a light that gives none."""
-    return sum(area.radiance) / 3 * area.area or 1.0

@@ -11,11 +11,11 @@ import torch
 
 from gibench.baselines.bakes import BakeCache
 from gibench.baselines.image_to_image import implementation
-from gibench.baselines.image_to_image.examples import READ, Draw, Examples
+from gibench.baselines.image_to_image.examples import READ, Draw, Examples, inputs_of
 from gibench.baselines.image_to_image.frames import Frames
 from gibench.baselines.image_to_image.learner import IndirectLight, TrainingPlan
-from gibench.baselines.image_to_image.shading import brightness, demodulated
-from gibench.baselines.image_to_image.units import Units, flux
+from gibench.baselines.image_to_image.shading import brightness, demodulated, in_units, indirect
+from gibench.baselines.image_to_image.units import Units
 from gibench.baselines.method import Training, View
 from gibench.baselines.stages import Stages
 from gibench.baselines.training import artifacts
@@ -125,21 +125,50 @@ def test_light_of_image_networks_is_in_units_of_what_the_light_gives_off(room):
     assert not units.own
     examples = Examples(frames, units)
     read = [(examples[k], frames.area_light(k)) for k in range(len(examples))]
-    found = [float(example["unit"]) / flux(area) for example, area in read]
-    assert found == pytest.approx([units.in_view] * len(found))
+    for example, area in read:
+        given = units.in_view * area.area * torch.tensor(area.radiance)
+        torch.testing.assert_close(example["unit"].flatten(), given)
     seen = [
-        float(brightness(demodulated(example["direct_diffuse"], example["albedo"]))) for example, _ in read
+        in_units(demodulated(one["direct_diffuse"], one["albedo"]), one["unit"]).mean() for one, _ in read
     ]
-    assert units.in_view == pytest.approx(
-        np.mean([s / flux(area) for s, (_, area) in zip(seen, read, strict=True)])
-    )
+    assert np.mean(seen) == pytest.approx(1, rel=1e-5)
     # How bright the room is is known: exposures are not drawn.
     drawn = Draw(16, 0.0)(examples[0], np.random.default_rng(0))
     assert torch.equal(drawn["unit"], examples[0]["unit"])
     # Nothing is known of it where a light gives nothing, or nothing of it was ever in view.
-    assert flux(dataclasses.replace(read[0][1], radiance=(0, 0, 0))) == 1
     light = demodulated(read[0][0]["direct_diffuse"], read[0][0]["albedo"])
     assert torch.equal(Units().of(light, read[0][1]), brightness(light))
+    assert not units.of(light, dataclasses.replace(read[0][1], radiance=(0, 0, 0))).any()
+
+
+@torch.no_grad()
+@pytest.mark.parametrize(("tint", "error"), [((1, 0.5, 0.125), 0), ((1, 0.5, 0.1), 1e-4), ((1, 0.5, 0), 0)])
+@pytest.mark.parametrize("name", ["bcn", "gfa"])
+def test_the_colour_of_the_light_is_that_of_the_prediction(room, name, tint, error):
+    frames = Frames(training_set(room), READ)
+    units, area = Units.of_frames(frames), frames.area_light(0)
+    example = inputs_of(Examples(frames, units)[0])
+    torch.manual_seed(0)
+    method = installed().get(name).method
+    network = method.load()(method.settings({"width": 0.125})).network().eval()
+
+    def made(tint):
+        light = torch.tensor(tint)[:, None, None]
+        lamp = dataclasses.replace(
+            area, radiance=tuple((light.flatten() * torch.tensor(area.radiance)).tolist())
+        )
+        direct, albedo = example["direct"] * light, example["albedo"]
+        unit = units.of(demodulated(direct, albedo), lamp)
+        return indirect(network, *(image[None] for image in (direct, albedo, example["geometry"], unit)))[0]
+
+    white, tinted = made((1, 1, 1)), made(tint)
+    held = torch.tensor(tint) > 0
+    expected = white * torch.tensor(tint)[:, None, None]
+    assert (white > 0).all()
+    if held.all():
+        torch.testing.assert_close(tinted, expected, rtol=error, atol=0)
+    # What is left of a light without blue is lit by nothing blue.
+    assert not tinted[~held].any()
 
 
 def test_a_frame_that_sees_no_direct_light_teaches_an_image_network(room):
@@ -153,6 +182,25 @@ def test_a_frame_that_sees_no_direct_light_teaches_an_image_network(room):
     batch = next(iter(learner.batches()(0)))
     losses = learner.step({**batch, "direct": 0 * batch["direct"]}, Step(0, 0.0, np.random.default_rng(0)))
     assert losses["content"] > 0
+
+
+def test_a_colour_that_the_light_lacks_teaches_nothing(room):
+    frames = Frames(training_set(room), READ)
+    examples = Examples(frames, Units.of_frames(frames))
+    method = installed().get("bcn").method
+    torch.manual_seed(0)
+    network = method.load()({**method.settings(), "width": 0.125}).network()
+    learner = IndirectLight(network, examples, examples, TrainingPlan(24, 1, False, True, 0))
+    batch = next(iter(learner.batches()(0)))
+    blue = torch.tensor([0.0, 0, 1])[:, None, None]
+    losses = learner.step(
+        {**batch, "unit": batch["unit"] * (1 - blue)}, Step(0, 0.0, np.random.default_rng(0))
+    )
+    assert all(torch.isfinite(loss) for loss in losses.values())
+    assert losses["content"] > 0
+    gradient = learner.network.last.weight.grad
+    assert gradient[:2].any()
+    assert not gradient[2].any()
 
 
 def test_an_image_network_gives_frames_by_the_unit_that_it_learned_in(room, rig, tmp_path):
@@ -174,6 +222,11 @@ def test_an_image_network_gives_frames_by_the_unit_that_it_learned_in(room, rig,
     rig.set(Lighting(area))
     twice = running.render(View(Shot(shot.camera, Lighting(area)), None, RESOLUTION, 0, 0), Stages())
     np.testing.assert_allclose(twice.indirect, 2 * found.indirect, rtol=1e-4, atol=1e-7)
+    tint = np.array([1, 0.5, 0.1])
+    tinted_light = dataclasses.replace(shot.lighting.area, radiance=tuple(tint * shot.lighting.area.radiance))
+    rig.set(Lighting(tinted_light))
+    tinted = running.render(View(Shot(shot.camera, Lighting(tinted_light)), None, RESOLUTION, 0, 0), Stages())
+    np.testing.assert_allclose(tinted.indirect, tint * found.indirect, rtol=1e-4, atol=1e-7)
     # A light that nothing in view sees leaves what the unit says, which is not black.
     below = dataclasses.replace(area, centre=(0, 0, -5), direction=(0, 0, -1))
     rig.set(Lighting(below))
