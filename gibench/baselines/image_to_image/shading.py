@@ -3,7 +3,7 @@
 Direct light is divided by albedo, and what the network says is multiplied by it (Gai, Wang & Li, Geometry-Aware Global
 Feature Aggregation for Real-Time Indirect Illumination, section 3.1). They learn from random exposures that a brighter
 room is the same room (section 3.3); here light is also divided by its unit (see `units`), so that it is so for any
-network, and its numbers stay in the range that it was trained in. Lengths are divided by the mean depth.
+network, and its numbers stay in the range that it was trained in. Lengths are divided by the median depth.
 """
 
 from __future__ import annotations
@@ -27,6 +27,9 @@ LIGHT = 2
 
 DARKEST = 0.01
 """Added to albedo before anything is divided by it: black surfaces reflect nothing, and nothing is what they get."""
+
+FARTHEST = 8.0
+"""Depth that a network is told of at most, in units of the median depth of a frame."""
 
 OUTPUT = Exponential(largest=1e4, smallest=1e-6)
 """Of indirect light over albedo, in its unit."""
@@ -53,12 +56,26 @@ def in_units(light: Tensor, unit: Tensor) -> Tensor:
 
 
 def geometry(images: Images) -> Tensor:
-    """(…, GEOMETRY, H, W) of images in camera space, lengths in units of the mean depth of what is hit."""
+    """(…, GEOMETRY, H, W) of images in camera space, lengths in units of the median depth of what is hit.
+
+    What lies deeper than FARTHEST units is drawn nearer along its ray, to that depth: ground that a window shows a
+    kilometre away would be all that a network sees of a room.
+    """
     depth = images["depth"]
-    hit = (depth > 0).sum(dim=(-3, -2, -1), keepdim=True)
-    unit = depth.sum(dim=(-3, -2, -1), keepdim=True) / hit.clamp(min=1)
-    unit = torch.where(unit > 0, unit, 1)
-    return torch.cat([images["position"] / unit, images["normal"], depth / unit], dim=-3)
+    unit = median_depth(depth)
+    nearer = FARTHEST / torch.clamp(depth / unit, min=FARTHEST)
+    return torch.cat([images["position"] / unit * nearer, images["normal"], depth / unit * nearer], dim=-3)
+
+
+def median_depth(depth: Tensor) -> Tensor:
+    """(…, 1, 1, 1): the lower median of depths (…, 1, H, W) above 0; 1 where there are none."""
+    flat = depth.flatten(-3)
+    hit = flat > 0
+    # A sort repeats its bits on every device; torch.median does not.
+    ordered = torch.where(hit, flat, torch.inf).sort(dim=-1).values
+    middle = (hit.sum(dim=-1, keepdim=True) - 1).clamp(min=0) // 2
+    found = ordered.gather(-1, middle)
+    return torch.where(found.isfinite(), found, 1)[..., None, None]
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,15 @@ from gibench.baselines.image_to_image import implementation
 from gibench.baselines.image_to_image.examples import READ, Draw, Examples, inputs_of
 from gibench.baselines.image_to_image.frames import Frames
 from gibench.baselines.image_to_image.learner import IndirectLight, TrainingPlan
-from gibench.baselines.image_to_image.shading import GEOMETRY, Inputs, brightness, demodulated, indirect
+from gibench.baselines.image_to_image.shading import (
+    FARTHEST,
+    GEOMETRY,
+    Inputs,
+    brightness,
+    demodulated,
+    geometry,
+    indirect,
+)
 from gibench.baselines.image_to_image.units import Units
 from gibench.baselines.method import MethodError, Training
 from gibench.baselines.stages import Stages
@@ -214,6 +222,48 @@ def test_what_a_step_sees(views):
         sign = 1 if same else -1
         x = one["geometry"][0] if same else one["geometry"][0].flip(-1)
         torch.testing.assert_close(x, sign * whole["geometry"][0])
+
+
+def test_ground_far_away_leaves_the_room_its_size():
+    generator = torch.Generator().manual_seed(0)
+    depth = 1 + 5 * torch.rand(1, 20, 30, generator=generator)
+    rays = torch.cat([torch.randn(2, 20, 30, generator=generator), torch.ones(1, 20, 30)])
+    normal = torch.randn(3, 20, 30, generator=generator)
+    missed = torch.rand(1, 20, 30, generator=generator) < 0.1
+    depth[missed] = 0
+
+    def seen(depth):
+        return geometry({"position": rays * depth, "normal": normal, "depth": depth})
+
+    far = (torch.rand(1, 20, 30, generator=generator) < 0.03) & ~missed
+    before, after = seen(depth), seen(torch.where(far, 1000, depth))
+    assert 10 < far.sum() < 30
+    torch.testing.assert_close(after[:, ~far[0]], before[:, ~far[0]], rtol=0.1, atol=0)
+    median = depth[depth > 0].median()
+    torch.testing.assert_close(before[6:], depth / median)
+    torch.testing.assert_close(before[:3], rays * depth / median)
+    # What is far lies on its ray, at the depth that is the last.
+    torch.testing.assert_close(after[6:][far], torch.full_like(after[6:][far], FARTHEST))
+    torch.testing.assert_close(after[:3][:, far[0]], FARTHEST * rays[:, far[0]])
+    assert torch.equal(after[3:6], normal)
+    # Of many frames each has its own, and nothing hit is nothing.
+    both = geometry(
+        {
+            "position": torch.stack([rays * depth, 0 * rays]),
+            "normal": torch.stack([normal] * 2),
+            "depth": torch.stack([depth, 0 * depth]),
+        }
+    )
+    torch.testing.assert_close(both[0], before)
+    assert not both[1, [0, 1, 2, 6]].any()
+
+
+@pytest.mark.parametrize("scale", [1e-30, 1e30])
+def test_a_room_of_any_size_is_the_same_room(scale):
+    depth = torch.linspace(1, 40, 60).reshape(1, 6, 10)
+    images = {"position": depth.expand(3, 6, 10), "normal": torch.ones(3, 6, 10), "depth": depth}
+    larger = {**images, "position": scale * images["position"], "depth": scale * depth}
+    torch.testing.assert_close(geometry(larger), geometry(images))
 
 
 def test_one_frame_is_too_few(room, tmp_path):
