@@ -25,7 +25,7 @@ from gibench.baselines.training.loop import train
 from gibench.baselines.training.reproducible import seeded
 from gibench.rendering.backend import torch_device
 
-HELD_OUT, MOST_HELD_OUT = 0.05, 8
+HELD_OUT, MOST_HELD_OUT = 0.05, 24
 """Share of the training rooms that a network does not learn from, and how many of their frames are looked at."""
 
 
