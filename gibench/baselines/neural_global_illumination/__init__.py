@@ -30,8 +30,8 @@ METHOD = Method(
         Knob(
             "lighting",
             "all",
-            ("position", "no-cues", "all"),
-            "the light by its centre, by its direction and direct light, or by radiance cues too",
+            ("position", "no-cues", "all", "facing"),
+            "the light by its centre; by its direction and direct light; by cues too; or also by where it faces",
             trains=True,
         ),
         Knob("images", 1.0, (0.1, 0.2, 0.5, 1.0), "share of the training frames", trains=True),
@@ -46,5 +46,6 @@ METHOD = Method(
         Variant("no-cnn", {"cnn": False}),
         Variant("no-encoding", {"encoding": False}),
         Variant("position-only", {"lighting": "position"}),
+        Variant("facing", {"lighting": "facing"}),
     ),
 )

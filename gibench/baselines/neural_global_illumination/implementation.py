@@ -12,8 +12,8 @@ from gibench.baselines.method import MethodError, Prediction, Setting, Site, Tra
 from gibench.baselines.moving_light.lit_frames import LitFrames
 from gibench.baselines.moving_light.measure import CODE, HELD_OUT, JUDGED, Measure, measured, unit_of
 from gibench.baselines.neural_global_illumination import METHOD, SURFACE
-from gibench.baselines.neural_global_illumination.inputs import assembled
-from gibench.baselines.neural_global_illumination.network import NeuralGlobalIllumination
+from gibench.baselines.neural_global_illumination.inputs import CUED, assembled
+from gibench.baselines.neural_global_illumination.network import FACING, INPUTS, NeuralGlobalIllumination
 from gibench.baselines.neural_global_illumination.training import (
     Examples,
     Predicting,
@@ -64,13 +64,14 @@ class NeuralLight:
         """Read the network."""
         if site.weights is None:
             raise MethodError("ngi has not been trained: it needs the folder that `train` filled")
-        self.network = NeuralGlobalIllumination(size_of(self.settings))
+        inputs = sum(INPUTS.values()) + FACING * (self._lighting == "facing")
+        self.network = NeuralGlobalIllumination(size_of(self.settings), inputs)
         with reading("the trained network", site.weights):
             weights, facts = artifacts.kept(site.weights)
             self.network.load_state_dict(weights["network"])
             self.measure = Measure.of_facts(facts)
         self.network.eval().requires_grad_(False).to(torch_device())
-        self._frames = LitFrames(site.scene, SURFACE, cues=self._lighting == "all")
+        self._frames = LitFrames(site.scene, SURFACE, cues=self._lighting in CUED)
 
     def render(self, view: View, stages: Stages) -> Prediction:
         """Direct light and cues, then the network."""

@@ -19,8 +19,13 @@ from gibench.rendering.lighting import AreaLight
 LIGHT = ("direct_diffuse", "direct_specular", *CUES)
 """Channels of direct light."""
 
-LIGHTING = ("all", "no-cues", "position")
-"""How the network is told of the light: by all of section 3.2.1; without radiance cues; by the place of its centre."""
+LIGHTING = ("all", "no-cues", "position", "facing")
+"""How the network is told of the light: by all of section 3.2.1; without radiance cues; by the place of its centre; by
+all, and by where it faces.
+"""
+
+CUED = ("all", "facing")
+"""Of these, those with radiance cues."""
 
 MIRROR_ROUGHNESS = 1e-3
 """GGX alpha below which a surface without diffuse albedo is a perfect mirror."""
@@ -29,7 +34,7 @@ MIRROR_ROUGHNESS = 1e-3
 def assembled(
     images: Images, camera: PinholeCamera, area: AreaLight, measure: Measure, lighting: str
 ) -> Tensor:
-    """The 34 channels of a frame, `network.INPUTS`, (34, H, W), finite. What the network is not told of is 0.
+    """The channels of a frame, `network.INPUTS`, (34 or 37, H, W), finite. What the network is not told of is 0.
 
     images: SURFACE and LIGHT, (C, H, W), in world space. lighting: one of LIGHTING.
     """
@@ -55,9 +60,11 @@ def assembled(
     direct = images["direct_diffuse"] + images["direct_specular"]
     lights = (direct, *(images[name] for name in CUES))
     coded = [CODE.encode(per_flux(light, area) / measure.direct) for light in lights]
-    told = {"all": 1 + len(CUES), "no-cues": 1, "position": 0}[lighting]
+    told = {"no-cues": 1, "position": 0}.get(lighting, 1 + len(CUES))
     parts += [part if number < told else torch.zeros_like(part) for number, part in enumerate(coded)]
     parts.append(
         measure.inside(centre.expand_as(place)) if lighting == "position" else unit_vectors(centre - place)
     )
+    if lighting == "facing":
+        parts.append(place.new_tensor(area.direction)[:, None, None].expand_as(place))
     return torch.where(hit, torch.cat(parts), 0)

@@ -29,6 +29,9 @@ INPUTS = {
 }
 """Channels of a pixel, in this order: 34 (section 3.2)."""
 
+FACING = 3
+"""Channels after them, of where the light faces, for a network that is told it; they are not encoded."""
+
 JOINED = 4
 """Layer of the perceptron that is given its input again."""
 
@@ -68,7 +71,7 @@ class NeuralGlobalIllumination(nn.Module):
     encoded: Tensor
 
     def __init__(self, size: Size = FULL, inputs: int = sum(INPUTS.values())) -> None:
-        """inputs: channels of a pixel, fewer where some of INPUTS at their end are left out."""
+        """inputs: channels of a pixel, fewer where some of INPUTS at their end are left out, more with FACING."""
         super().__init__()
         self.size = size
         self.register_buffer("encoded", _channels_of(size.encoded, inputs), persistent=False)

@@ -120,7 +120,7 @@ class Predicting(Learner):
         """judged: the held-out frames. Raises WeightsError where LPIPS has none."""
         self.examples, self.plan = examples, plan
         with seeded(plan.seed):
-            self.network = NeuralGlobalIllumination(plan.size)
+            self.network = NeuralGlobalIllumination(plan.size, len(judged[0].inputs))
         self.network.begin_at(
             torch.stack([one.code.mean(dim=(1, 2)) for one in some_of(examples)]).mean(dim=0)
         )

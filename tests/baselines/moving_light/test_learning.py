@@ -34,7 +34,9 @@ RESOLUTION = (32, 24)
 STEPS = 3
 SETTINGS = {
     "ngi": {"network": "small", "crop": 32, "lpips": False, "rays": 1},
+    "ngi:facing": {"network": "small", "crop": 32, "lpips": False, "rays": 1, "lighting": "facing"},
     "rrf": {"cells": 16, "rays": 1},
+    "rrf:facing": {"cells": 16, "rays": 1, "facing": True},
     "cnnr": {"network": "small", "crop": 32, "observed": 4, "rays": 1},
 }
 PACKAGES = {
@@ -67,7 +69,7 @@ def prepared(name, room, rig, folder):
     bakes = BakeCache(folder / "bakes", "scene", {}, views)
     at = dataclasses.replace(site(rig.scene, folder), training=views, rig=rig, bakes=bakes, max_depth=3)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(f"gibench.baselines.{PACKAGES[name]}.training.STEPS", STEPS)
+        patch.setattr(f"gibench.baselines.{PACKAGES[name.partition(':')[0]]}.training.STEPS", STEPS)
         if method.trains:
             weights = folder / "weights"
             weights.mkdir()

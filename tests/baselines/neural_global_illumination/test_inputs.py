@@ -34,7 +34,7 @@ def frame(height=4, width=5, seed=0):
 
 
 def parts(inputs):
-    return dict(zip(INPUTS, inputs.split(list(INPUTS.values())), strict=True))
+    return dict(zip(INPUTS, inputs[:34].split(list(INPUTS.values())), strict=True))
 
 
 def test_all_channels_are_where_the_network_has_them():
@@ -71,11 +71,18 @@ def test_a_brighter_light_is_the_same_light():
         torch.testing.assert_close(per_flux(scale * indirect, brighter), per_flux(indirect, AREA))
 
 
+def test_where_the_light_faces_comes_after_all_else():
+    images = frame()
+    found = assembled(images, CAMERA, AREA, MEASURE, "facing")
+    assert torch.equal(found[:34], assembled(images, CAMERA, AREA, MEASURE, "all"))
+    assert found[34:, 2, 3].tolist() == list(AREA.direction)
+
+
 @pytest.mark.parametrize("lighting", LIGHTING)
 def test_what_a_variant_is_not_told(lighting):
     images = frame()
     found, whole = (parts(assembled(images, CAMERA, AREA, MEASURE, told)) for told in (lighting, "all"))
-    assert found["cues"].any() == (lighting == "all")
+    assert found["cues"].any() == (lighting in ("all", "facing"))
     assert found["direct"].any() == (lighting != "position")
     constant = bool((found["light_direction"] == found["light_direction"][:, :1, :1]).all())
     assert constant == (lighting == "position")

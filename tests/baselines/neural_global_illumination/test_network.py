@@ -8,6 +8,7 @@ import pytest
 import torch
 
 from gibench.baselines.neural_global_illumination.network import (
+    FACING,
     FULL,
     INPUTS,
     SMALL,
@@ -75,6 +76,12 @@ def test_fewer_inputs_are_those_at_the_beginning():
     net = NeuralGlobalIllumination(dataclasses.replace(TINY, encoded=tuple(INPUTS)), inputs=19)
     assert net.encoded.tolist() == list(range(19))
     assert net(torch.randn(1, 19, 8, 8)).shape == (1, 3, 8, 8)
+
+
+def test_inputs_beyond_those_of_the_paper_are_not_encoded():
+    more, paper = NeuralGlobalIllumination(TINY, 34 + FACING), NeuralGlobalIllumination(TINY)
+    assert torch.equal(more.encoded, paper.encoded)
+    assert more(torch.randn(1, 37, 8, 8)).shape == (1, 3, 8, 8)
 
 
 def test_every_parameter_learns_through_the_code():

@@ -87,7 +87,7 @@ def test_the_perceptual_loss_comes_at_the_end():
 def test_every_variant_is_another_network_or_another_training(variant):
     settings = METHOD.settings({"network": "small", **variant.settings})
     size = size_of(settings)
-    assert (size == SMALL) == (variant.name in ("no-lpips", "no-cues", "position-only"))
+    assert (size == SMALL) == (variant.name in ("no-lpips", "no-cues", "position-only", "facing"))
     with torch.no_grad():
         code = NeuralGlobalIllumination(size)(torch.rand(1, 34, 32, 48))
     assert code.shape == (1, 3, 32, 48)
