@@ -8,10 +8,10 @@ from typing import Any, ClassVar
 
 from torch import Tensor, nn
 
-from gibench.baselines.image_to_image.frames import held_out
 from gibench.baselines.method import MethodError, Site, Training, reading
 from gibench.baselines.relighting.examples import Examples, box_of
 from gibench.baselines.relighting.frames import Relit
+from gibench.baselines.relighting.held_out import held_out
 from gibench.baselines.relighting.learner import RelightingLearner
 from gibench.baselines.relighting.surfaces import Box, Pixels
 from gibench.baselines.sources import digest
@@ -22,8 +22,8 @@ from gibench.baselines.training.loop import train
 from gibench.baselines.training_set import TrainingSet
 from gibench.rendering.backend import torch_device
 
-HELD_OUT, JUDGED = 0.05, 8
-"""Share of the training frames that is held out, and how many of these are looked at."""
+HELD_OUT, JUDGED = 0.05, 24
+"""Share of the environments that is held out, and how many frames under them are looked at."""
 
 
 class RelitByNetwork(Relit):

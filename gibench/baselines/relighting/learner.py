@@ -23,7 +23,7 @@ FRAMES = 4
 LARGEST_GRADIENT = 1.0
 """Norm that gradients are cut down to."""
 
-JUDGED_PIXELS = 512
+JUDGED_PIXELS = 170
 """Of a frame that is held out."""
 
 
