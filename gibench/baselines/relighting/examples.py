@@ -93,6 +93,13 @@ class Examples:
         light = self._light(environment_at(self.views, self.numbers[index]))
         return self.seen(index), light * self.frames.exposure(index)
 
+    def read(self) -> None:
+        """Read all that is kept in memory, and take the light of it: so that no clock is on while it is first read."""
+        for index in range(len(self)):
+            self[index]
+            if index not in self._kept:
+                break
+
     def seen(self, index: int) -> Seen:
         """A frame, read or taken from memory."""
         if index not in self._kept:

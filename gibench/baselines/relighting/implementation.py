@@ -60,6 +60,8 @@ class RelitByNetwork(Relit):
         box = box_of(views, learned)
         self.survey(views, learned[0], box, training.folder)
         examples, apart = (Examples(views, numbers, box, self.light_of) for numbers in (learned, judged))
+        # Some learners look at all frames first, others at none: either way the seconds are of learning alone.
+        examples.read()
         learner = self.learner(examples, apart, training.seed)
         names = self.method.trained_settings(self.settings)
         sources = digest(type(self).__module__)

@@ -107,6 +107,23 @@ def test_nothing_is_read_or_taken_twice(made):
     assert asked == ["map 1", "map 0"]
 
 
+def test_all_is_read_before_a_training_begins(made):
+    examples, asked = made
+    examples.read()
+    assert Read.reads == 3
+    for index in range(len(examples)):
+        examples[index]
+    assert Read.reads == 3
+    assert asked == ["map 1", "map 0"]
+
+
+def test_of_what_does_not_fit_no_more_is_read_than_that(made, monkeypatch):
+    examples, _ = made
+    monkeypatch.setattr(module, "KEPT", 1)
+    examples.read()
+    assert Read.reads == 1
+
+
 def test_what_does_not_fit_is_read_again(made, monkeypatch):
     examples, _ = made
     monkeypatch.setattr(module, "KEPT", 5000)
