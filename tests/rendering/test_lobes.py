@@ -96,3 +96,20 @@ def test_a_holes_share_is_taken_once(material):
     found = scatter_paths(sky, paths, si, bsdf, on, max_depth=1, lobes="diffuse", layers=layers)
     np.testing.assert_allclose(numbers(found.direct_diffuse).mean(axis=1), expected, rtol=0.02)
     assert not numbers(found.direct_specular).any()
+
+
+def test_what_the_diffuse_lobe_reflects_of_even_light(material):
+    import drjit as dr
+    import mitsuba as mi
+
+    from gibench.rendering.lobes import diffuse_lobe, diffuse_reflectance
+
+    name, layers, bsdf, si, sampler = material
+    on = dr.full(mi.Bool, True, COUNT)
+    wo = mi.warp.square_to_cosine_hemisphere(sampler.next_2d())
+    drawn = diffuse_lobe(layers, bsdf, si, wo, on) * dr.pi / wo.z
+    expected = numbers(drawn).mean(axis=1)
+    found = numbers(diffuse_reflectance(layers, bsdf, si, on))[:, 0]
+    np.testing.assert_allclose(found, expected, rtol=0.01)
+    if name == "diffuse":
+        np.testing.assert_allclose(found, COLOR, rtol=1e-5)

@@ -28,6 +28,7 @@ from gibench.baselines.precomputed_radiance_transfer.reflection import (
     lobe_kernel,
     reflectance,
 )
+from gibench.baselines.precomputed_radiance_transfer.surfaces import ReflectingFrames
 from gibench.baselines.relighting.examples import MEASURED, Light
 from gibench.baselines.relighting.frames import Relit
 from gibench.baselines.relighting.surfaces import MATERIAL, Box, Pixels, hit
@@ -63,6 +64,7 @@ class HarmonicTransfer(Relit):
     def prepare(self, site: Site) -> None:
         """Find the transfer of the scene."""
         super().prepare(site)
+        self._surfaces = ReflectingFrames(site.scene)
         self._reflected = int(self.settings["reflected"])
         box = seen_box(site, self._surfaces)
         chosen = {
