@@ -1,8 +1,10 @@
 """The room as a volume sees it: where its cells are, and how much of the light between two of them is blocked.
 
 Kaplanyan & Dachsbacher 2010, section 4.3: surfaces are put into a grid shifted by half a cell, as what share of a
-cell's face they cover, by direction. The paper takes them from shadow maps and the camera, anew each frame. Here things
-stay: they are found once, with rays all over the free space, whatever the camera will see of them.
+cell's face they cover, by direction. The paper takes them from shadow maps and the camera, anew each frame, and keeps
+them in two bands of spherical harmonics. Here things stay: they are found once, with rays all over the free space,
+whatever the camera will see of them. Light travels along six directions alone, so the shares of these six are kept: in
+two bands a wall would also cover a quarter of what passes along it.
 """
 
 # mypy: disable-error-code="no-untyped-def, misc"
@@ -15,7 +17,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from gibench.baselines.light_propagation_volumes.volume import Grid, rays_of_a_step
+from gibench.baselines.light_propagation_volumes.volume import AXES, Grid
 from gibench.rendering.free_space import NoFreeSpace, free_space
 from gibench.rendering.scene import Scene
 
@@ -39,10 +41,11 @@ def room_box(scene: Scene, margin: float = 0.02) -> tuple[NDArray[np.float64], N
 
 
 def covered(scene: Scene, grid: Grid, rays: int = RAYS) -> NDArray[np.float32]:
-    """(X + 1, Y + 1, Z + 1, 4): of each corner of the cells, the share a + v · ω of a cell's face that is covered.
+    """(X + 1, Y + 1, Z + 1, 6) ≥ 0: of each corner of the cells, what covers a cell's face, by where it faces, `AXES`.
 
-    ω is where the surfaces face. A chord through a random point of the box in a random direction finds a piece of
-    surface as often as it is large and the chord long: 4 · volume / (chords · length) is the area that it stands for.
+    In areas of a face. A surface with the normal n covers what it is seen as along the axis, its area · max(n · axis, 0).
+    A chord through a random point of the box in a random direction finds a piece of surface as often as it is large and
+    the chord long: 4 · volume / (chords · length) is the area that it stands for.
     """
     low, side = np.array(grid.low), grid.side
     extent = side * np.array(grid.counts)
@@ -67,25 +70,28 @@ def covered(scene: Scene, grid: Grid, rays: int = RAYS) -> NDArray[np.float32]:
     inside = ((node >= 0) & (node < counts)).all(axis=1)
     node, normal, weight = node[inside], normal[inside], weight[inside] / side**2
     flat = np.ravel_multi_index(node.T, counts) if len(node) else np.zeros(0, dtype=np.int64)
-    parts = [0.25 * weight, *(0.5 * weight * normal[:, k] for k in range(3))]
+    parts = weight * np.maximum(np.array(AXES) @ normal.T, 0)
     sums = [np.bincount(flat, part, minlength=int(counts.prod())) for part in parts]
-    return np.stack(sums, axis=-1).reshape(*counts, 4).astype(np.float32)
+    return np.stack(sums, axis=-1).reshape(*counts, len(AXES)).astype(np.float32)
 
 
 def passing(grid: Grid, cover: NDArray[Any]) -> NDArray[np.float32]:
-    """(30, cells): shares of light that come through, for each of `rays_of_a_step`, into each cell.
+    """(6, cells): shares of light that come through into each cell, for each direction of travel, `AXES`.
 
-    What lies on the face that two cells share, the mean of its four corners, blocks what comes towards it.
+    What lies on the face that two cells share, the mean of its four corners, blocks what comes towards it. All five rays
+    of a step go through that face and are blocked alike: what one of them meets behind it, such as the wall beside the
+    next cell, is what it is on its way to.
+
+    cover: of `covered`.
     """
     shares = []
-    for travel, ray in rays_of_a_step():
-        axis = int(np.argmax(np.abs(travel)))
-        near = cover
+    for number, travel in enumerate(AXES):
+        axis = number // 2
+        near = cover[..., AXES.index(tuple(-t + 0.0 for t in travel))]
         for other in range(3):
             before, after = (np.delete(near, place, axis=other) for place in (-1, 0))
             # Across the way, the mean; along it, the face through which light comes in.
             entered = before if travel[axis] > 0 else after
             near = entered if other == axis else 0.5 * (before + after)
-        blocked = near[..., 0] - near[..., 1:] @ np.array(ray)
-        shares.append(1 - np.clip(blocked, 0, 1).transpose(2, 1, 0).ravel())  # x runs fastest
+        shares.append(1 - np.clip(near, 0, 1).transpose(2, 1, 0).ravel())  # x runs fastest
     return np.array(shares, dtype=np.float32)

@@ -18,7 +18,7 @@ import numpy as np
 from gibench.baselines.first_hits import averaged, hits_of_rays
 from gibench.baselines.light_propagation_volumes.emission import lit_volume
 from gibench.baselines.light_propagation_volumes.geometry import covered, passing, room_box
-from gibench.baselines.light_propagation_volumes.volume import EVEN, Grid, looked_up, propagated
+from gibench.baselines.light_propagation_volumes.volume import AXES, EVEN, Grid, looked_up, propagated
 from gibench.baselines.linearly_transformed_cosines.implementation import RectangleLight, area_light
 from gibench.baselines.linearly_transformed_cosines.rectangle import light_arrays
 from gibench.baselines.method import Prediction, Setting, Site, View, reading
@@ -144,6 +144,6 @@ def _read(folder: Path) -> tuple[Grid, Any]:
     found = json.loads((folder / GRID).read_text(encoding="utf-8"))
     grid = Grid(tuple(found["low"]), float(found["side"]), tuple(found["counts"]))
     shares = np.load(folder / PASSING, allow_pickle=False)
-    if shares.shape != (30, grid.size):
+    if shares.shape != (len(AXES), grid.size):
         raise ValueError(f"{PASSING} is not of {grid.size} cells")
     return grid, shares

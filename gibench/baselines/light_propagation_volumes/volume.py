@@ -126,20 +126,18 @@ def as_intensity(sums: list[Any]) -> list[Any]:
 def propagated(grid: dict[str, Any], state: list[Any], passing: list[Any] | None, cells: int) -> list[Any]:
     """One step: what each cell has of its neighbours' light.
 
-    state: COMPONENTS arrays, mi.Float. passing: shares that are let through, one array for each of `rays_of_a_step`;
+    state: COMPONENTS arrays, mi.Float. passing: shares that are let through, an array for each direction of travel, AXES;
     None where nothing is in the way. cells: `Grid.size`.
     """
     here = cell_of(grid, dr.arange(mi.UInt32, cells))
     through = [[mi.Float(0)] * len(AXES) for _ in range(3)]  # flux by colour and face
-    rays = iter(range(len(AXES) * (len(AXES) - 1)))
-    for travel in AXES:
+    for number, travel in enumerate(AXES):
         source, inside = index_of(grid, here - mi.Vector3i(*(int(c) for c in travel)))
         sent = [dr.gather(mi.Float, part, source, inside) for part in state]
+        if passing is not None:
+            sent = [part * passing[number] for part in sent]
         for face, ray in _faces(travel):
-            number = next(rays)
-            share = mi.Float(AHEAD if face == travel else ASIDE)
-            if passing is not None:
-                share *= passing[number]
+            share = AHEAD if face == travel else ASIDE
             for color in range(3):
                 a, *v = sent[4 * color : 4 * color + 4]
                 intensity = a + sum(part * along for part, along in zip(v, ray, strict=True) if along)
