@@ -24,6 +24,9 @@ from gibench.rendering.scene import Scene
 RAYS = 1 << 20
 """Along which surfaces are looked for."""
 
+TIE = 1e-3
+"""Of the side of a cell: how far apart two faces are equally near."""
+
 
 def room_box(scene: Scene, margin: float = 0.02) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Corners (3,) of a box around the free space of the room; of the whole scene where nothing is enclosed.
@@ -40,58 +43,55 @@ def room_box(scene: Scene, margin: float = 0.02) -> tuple[NDArray[np.float64], N
     return low - more, high + more
 
 
-def covered(scene: Scene, grid: Grid, rays: int = RAYS) -> NDArray[np.float32]:
-    """(X + 1, Y + 1, Z + 1, 6) ≥ 0: of each corner of the cells, what covers a cell's face, by where it faces, `AXES`.
+def surfaces(scene: Scene, grid: Grid, rays: int = RAYS) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    """Pieces of surface in the box of a grid, as seen from free space: points (N, 3), normals (N, 3), areas (N,), m².
 
-    In areas of a face. A surface with the normal n covers what it is seen as along the axis, its area · max(n · axis, 0).
     A chord through a random point of the box in a random direction finds a piece of surface as often as it is large and
-    the chord long: 4 · volume / (chords · length) is the area that it stands for.
+    the chord long: 2 · volume / (chords · length) is the area that each of its ends stands for.
     """
-    low, side = np.array(grid.low), grid.side
-    extent = side * np.array(grid.counts)
+    low, extent = np.array(grid.low), grid.side * np.array(grid.counts)
     index = dr.arange(mi.UInt32, rays)
     u = [mi.sample_tea_float32(index, mi.UInt32(k)) for k in range(5)]
     origin = mi.Point3f(*(float(low[k]) + u[k] * float(extent[k]) for k in range(3)))
     direction = mi.warp.square_to_uniform_sphere(mi.Point2f(u[3], u[4]))
-    there, back = (
-        scene.mi_scene.ray_intersect(mi.Ray3f(origin, way), mi.RayFlags.Minimal, False)
-        for way in (direction, -direction)
-    )
-    front = there.is_valid() & (dr.dot(there.n, direction) < 0)
+    ways = (direction, -direction)
+    ends = [scene.mi_scene.ray_intersect(mi.Ray3f(origin, way), mi.RayFlags.Minimal, False) for way in ways]
     # Outside of the room, and in a window, chords end nowhere: those through the box are no longer than its diagonal.
     longest = float(np.linalg.norm(extent))
-    chord = dr.minimum(there.t, longest) + dr.minimum(back.t, longest)
-    area = (4 * float(extent.prod()) / rays) / dr.maximum(chord, 1e-3 * longest)
-    dr.eval(front, area, there.p, there.n)
-    chosen = np.array(front)
-    point, normal, weight = np.array(there.p).T[chosen], np.array(there.n).T[chosen], np.array(area)[chosen]
-    counts = np.array(grid.counts) + 1
-    node = np.rint((point - low) / side).astype(np.int64)
-    inside = ((node >= 0) & (node < counts)).all(axis=1)
-    node, normal, weight = node[inside], normal[inside], weight[inside] / side**2
-    flat = np.ravel_multi_index(node.T, counts) if len(node) else np.zeros(0, dtype=np.int64)
-    parts = weight * np.maximum(np.array(AXES) @ normal.T, 0)
-    sums = [np.bincount(flat, part, minlength=int(counts.prod())) for part in parts]
-    return np.stack(sums, axis=-1).reshape(*counts, len(AXES)).astype(np.float32)
+    chord = dr.minimum(ends[0].t, longest) + dr.minimum(ends[1].t, longest)
+    area = (2 * float(extent.prod()) / rays) / dr.maximum(chord, 1e-3 * longest)
+    fronts = [end.is_valid() & (dr.dot(end.n, way) < 0) for end, way in zip(ends, ways, strict=True)]
+    dr.eval(area, fronts, [(end.p, end.n) for end in ends])
+    found = []
+    for end, front in zip(ends, fronts, strict=True):
+        chosen = np.array(front)
+        found.append((np.array(end.p).T[chosen], np.array(end.n).T[chosen], np.array(area)[chosen]))
+    points, normals, areas = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return points, normals, areas
 
 
-def passing(grid: Grid, cover: NDArray[Any]) -> NDArray[np.float32]:
+def passing(
+    grid: Grid, points: NDArray[Any], normals: NDArray[Any], areas: NDArray[Any]
+) -> NDArray[np.float32]:
     """(6, cells): shares of light that come through into each cell, for each direction of travel, `AXES`.
 
-    What lies on the face that two cells share, the mean of its four corners, blocks what comes towards it. All five rays
-    of a step go through that face and are blocked alike: what one of them meets behind it, such as the wall beside the
-    next cell, is what it is on its way to.
+    A piece of surface belongs to the nearest face between two cells, and covers its area as seen along the axis, area ·
+    max(n · axis, 0), for light that comes towards its front. All five rays of a step go through that face and are
+    blocked alike: what one of them meets behind it, such as the wall beside the next cell, is where it is going.
 
-    cover: of `covered`.
+    points, normals, areas: of `surfaces`.
     """
-    shares = []
+    at = (points - grid.low) / grid.side
+    cell = np.floor(at).astype(np.int64)
+    # A wall in the middle between two faces is on the one behind it, as a whole, however its points are rounded.
+    face = np.rint(at - TIE * normals).astype(np.int64)
+    covered = np.zeros((len(AXES), grid.size))
     for number, travel in enumerate(AXES):
         axis = number // 2
-        near = cover[..., AXES.index(tuple(-t + 0.0 for t in travel))]
-        for other in range(3):
-            before, after = (np.delete(near, place, axis=other) for place in (-1, 0))
-            # Across the way, the mean; along it, the face through which light comes in.
-            entered = before if travel[axis] > 0 else after
-            near = entered if other == axis else 0.5 * (before + after)
-        shares.append(1 - np.clip(near, 0, 1).transpose(2, 1, 0).ravel())  # x runs fastest
-    return np.array(shares, dtype=np.float32)
+        into = cell.copy()
+        into[:, axis] = face[:, axis] - (travel[axis] < 0)
+        inside = ((into >= 0) & (into < grid.counts)).all(axis=1)
+        towards = np.maximum(-normals[:, axis] * travel[axis], 0) * inside
+        index = np.ravel_multi_index(into.T, grid.counts, mode="clip", order="F")  # x runs fastest
+        covered[number] = np.bincount(index, towards * areas, minlength=grid.size)
+    return (1 - np.minimum(covered / grid.side**2, 1)).astype(np.float32)

@@ -126,7 +126,7 @@ def as_intensity(sums: list[Any]) -> list[Any]:
 def propagated(grid: dict[str, Any], state: list[Any], passing: list[Any] | None, cells: int) -> list[Any]:
     """One step: what each cell has of its neighbours' light.
 
-    state: COMPONENTS arrays, mi.Float. passing: shares that are let through, an array for each direction of travel, AXES;
+    state: COMPONENTS arrays, mi.Float. passing: shares that are let through, one array for each direction of travel;
     None where nothing is in the way. cells: `Grid.size`.
     """
     here = cell_of(grid, dr.arange(mi.UInt32, cells))

@@ -5,13 +5,14 @@ from __future__ import annotations
 import dataclasses
 
 import drjit as dr
+import mitsuba as mi
 import numpy as np
 import pytest
 
 from gibench.baselines.light_propagation_volumes import METHOD
 from gibench.baselines.light_propagation_volumes.emission import lattice, lit_volume
-from gibench.baselines.light_propagation_volumes.geometry import covered
-from gibench.baselines.light_propagation_volumes.implementation import PropagatedLight
+from gibench.baselines.light_propagation_volumes.geometry import passing, surfaces
+from gibench.baselines.light_propagation_volumes.implementation import PropagatedLight, spread
 from gibench.baselines.light_propagation_volumes.volume import Grid
 from gibench.baselines.linearly_transformed_cosines.rectangle import light_arrays
 from gibench.baselines.method import MethodError, View
@@ -54,15 +55,19 @@ def frame(rig, method, light, resolution=RESOLUTION, camera=CAMERA):
 WHITE = 0.6
 
 
-@pytest.fixture(scope="module")
-def white_room():
+def closed_room(**more):
+    """Two metres wide, around the origin."""
     wall = scenes.two_sided(type="diffuse", reflectance=scenes.rgb(WHITE))
-    parts = {}
     for axis in range(3):
         for side in (-1, 1):
             centre = [float(side) if a == axis else 0.0 for a in range(3)]
-            parts[f"wall{axis}{side > 0}"] = scenes.rectangle(centre, [-c for c in centre], (1, 1), bsdf=wall)
-    return LightRig(load_dict({"type": "scene", **parts}), panoramas=False)
+            more[f"wall{axis}{side > 0}"] = scenes.rectangle(centre, [-c for c in centre], (1, 1), bsdf=wall)
+    return load_dict({"type": "scene", **more})
+
+
+@pytest.fixture(scope="module")
+def white_room():
+    return LightRig(closed_room(), panoramas=False)
 
 
 @pytest.fixture(scope="module")
@@ -92,9 +97,7 @@ def test_indirect_light_of_a_closed_white_room_is_that_of_paths(white_room, whit
     np.testing.assert_allclose(found.mean(axis=(0, 1)), truth.mean(axis=(0, 1)), rtol=0.15)
     method.adjust(METHOD.settings({**SETTINGS, "bounces": bounces}))
     blocked = frame(white_room, method, light, camera=INSIDE).indirect
-    assert (
-        0.5 * found.mean() < blocked.mean() < found.mean()
-    )  # walls are in the way of what passes along them
+    assert 0.9 * found.mean() < blocked.mean() < 1.01 * found.mean()
 
 
 def test_virtual_lights_hold_the_light_that_the_room_reflects(white_room):
@@ -116,13 +119,36 @@ def test_the_lattice_is_even():
     assert (u[:, None] * u[None]).mean(axis=2)[~np.eye(4, dtype=bool)] == pytest.approx(0.25, abs=2e-3)
 
 
-def test_walls_cover_what_is_behind_them(white_room):
-    """A wall on a face of the grid covers it: a quarter evenly, half by direction."""
-    grid = Grid((-1.0, -1.0, -1.0), 0.5, (4, 4, 4))
-    cover = covered(white_room.scene, grid, 1 << 17)
-    middle = cover[0, 2, 2]
-    assert middle == pytest.approx([0.25, 0.5, 0, 0], abs=0.05)
-    assert not cover[2, 2, 2].any()
+def test_surfaces_of_a_room_are_as_large_as_they_are():
+    """And the faces of cells behind them are covered: a grid that is a cell larger on every side."""
+    grid = Grid((-1.5, -1.5, -1.5), 0.5, (6, 6, 6))
+    points, normals, areas = surfaces(closed_room(), grid, 1 << 17)
+    assert np.abs(points).max() == pytest.approx(1, abs=1e-5)
+    by_side = [areas[normals[:, axis] * side > 0.5].sum() for axis in range(3) for side in (-1, 1)]
+    assert by_side == pytest.approx([4.0] * 6, rel=0.03)
+    shares = passing(grid, points, normals, areas).reshape(6, 6, 6, 6)
+    assert shares[0, 1:5, 1:5, 0].mean() < 0.05  # travelling along −x, into the cells behind the wall
+    assert (shares[:, 1:5, 1:5, 1:5] == 1).all()
+
+
+def test_rooms_beside_each_other_do_not_light_each_other():
+    """A wall of 4 mm parts them, in the middle of a cell."""
+    wall = scenes.two_sided(type="diffuse", reflectance=scenes.rgb(WHITE))
+    sheets = {f"sheet{side > 0}": [0.002 * side, 0, 0] for side in (-1, 1)}
+    scene = closed_room(
+        **{name: scenes.rectangle(at, [at[0] * 500, 0, 0], (1, 1), bsdf=wall) for name, at in sheets.items()}
+    )
+    grid = Grid((-1.0, -1.0, -1.0), 2 / 9, (9, 9, 9))
+    area = AreaLight((-0.9, 0.0, 0.0), (1, 0, 0), 0.5, 0.5, (5, 4, 3))
+    state = lit_volume(scene, grid.arrays, light_arrays(area), 4096, 4, grid.size)
+    shares = [mi.Float(share) for share in passing(grid, *surfaces(scene, grid, 1 << 18))]
+    lit, free = (
+        np.array(spread(grid.arrays, state, let_through, 64, grid.size)[0]).reshape(9, 9, 9).sum(axis=(0, 1))
+        for let_through in (shares, None)
+    )
+    there, unblocked = lit[5:].sum() / lit[:4].sum(), free[5:].sum() / free[:4].sum()
+    assert unblocked > 0.2
+    assert there < 0.1 * unblocked  # most of it comes of the first step, which nothing blocks
 
 
 def test_frames_compile_no_kernel_again(rig, method):

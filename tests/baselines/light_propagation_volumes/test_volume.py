@@ -141,68 +141,133 @@ def test_all_six_directions_are_alike(steps):
     np.testing.assert_allclose(expected[0], expected[0].transpose(1, 0, 2), atol=1e-7)
 
 
-def white_box(counts, steps, side=0.25):
-    """Irradiance on the walls of a closed box whose walls all send out one W/m²: middles of their cells, (N,)."""
-    grid = Grid((0.0, 0.0, 0.0), side, counts)
-    extent = side * np.array(counts)
+def box_sides(low, high, side, inwards):
+    """Middles of the squares on the sides of a box, (N, 3), and their normals. low, high: in sides of a square."""
     points, normals = [], []
     for axis in range(3):
         others = [a for a in range(3) if a != axis]
-        ticks = [side * (np.arange(counts[a]) + 0.5) for a in others]
-        first, second = (part.ravel() for part in np.meshgrid(*ticks, indexing="ij"))
-        for wall, inwards in ((0.0, 1.0), (extent[axis], -1.0)):
-            place, normal = np.zeros((len(first), 3)), np.zeros((len(first), 3))
-            place[:, others[0]], place[:, others[1]], place[:, axis] = first, second, wall
-            normal[:, axis] = inwards
+        first, second = np.meshgrid(*(np.arange(low[a], high[a]) + 0.5 for a in others), indexing="ij")
+        for wall, facing in ((low[axis], 1.0), (high[axis], -1.0)):
+            place, normal = np.zeros((first.size, 3)), np.zeros((first.size, 3))
+            place[:, others[0]], place[:, others[1]], place[:, axis] = first.ravel(), second.ravel(), wall
+            normal[:, axis] = facing if inwards else -facing
             points.append(place)
             normals.append(normal)
-    points, normals = np.concatenate(points), np.concatenate(normals)
-    flux = np.full((len(points), 3), side**2)
-    scale = flux.sum()
-    state = injection(grid, points, normals, flux / scale)
-    total = spread(grid.arrays, state, None, steps, grid.size)
-    at = mi.Point3f(np.ascontiguousarray((points + 0.5 * side * normals).T, dtype=np.float32))
+    return side * np.concatenate(points), np.concatenate(normals)
+
+
+def received(grid, points, normals, steps, shares=None):
+    """Irradiance on squares as large as a cell's faces that all send out one W/m², (N,)."""
+    state = injection(grid, points, normals, np.full((len(points), 3), 1 / len(points)))
+    total = spread(grid.arrays, state, shares, steps, grid.size)
+    at = mi.Point3f(np.ascontiguousarray((points + 0.5 * grid.side * normals).T, dtype=np.float32))
     towards = mi.Vector3f(np.ascontiguousarray(-normals.T, dtype=np.float32))
     found = looked_up(grid.arrays, total, at, towards, mi.Bool(True))
-    return np.array(found.x) * scale * EVEN / side**2
+    return np.array(found.x) * len(points) * EVEN
+
+
+def shares_of(grid, points, normals):
+    """What squares as large as a cell's faces let through, for `spread`."""
+    areas = np.full(len(points), grid.side**2)
+    return [mi.Float(np.ascontiguousarray(share)) for share in passing(grid, points, normals, areas)]
 
 
 @pytest.mark.parametrize("counts", [(8, 8, 8), (12, 6, 8)])
 def test_the_walls_of_a_closed_white_box_receive_what_they_send_out(counts):
     """Whatever its shape, for the form factors of a closed box add up to 1; the only factor is EVEN."""
-    received = white_box(counts, 96)
-    assert received.mean() == pytest.approx(1, abs=0.03)
-    assert np.abs(received - 1).max() < 0.2  # corners and edges are the worst
+    grid = Grid((0.0, 0.0, 0.0), 0.25, counts)
+    walls = box_sides((0, 0, 0), counts, 0.25, inwards=True)
+    found = received(grid, *walls, 96)
+    assert found.mean() == pytest.approx(1, abs=0.03)
+    assert np.abs(found - 1).max() < 0.2  # corners and edges are the worst
+    # Nothing is in the way of what passes along the walls and of what is on its way to them.
+    np.testing.assert_array_equal(received(grid, *walls, 96, shares_of(grid, *walls)), found)
 
 
-def test_a_wall_in_the_way_blocks_light():
-    grid = Grid((0.0, 0.0, 0.0), 1.0, (6, 3, 3))
-    cover = np.zeros((7, 4, 4, 4), dtype=np.float32)
-    cover[3, :, :, 0], cover[3, :, :, 1] = 0.25, -0.5  # faces −x
-    shares = passing(grid, cover)
-    assert shares.shape == (30, grid.size)
-    cells = shares.reshape(30, 3, 3, 6)
-    for number, (travel, ray) in enumerate(rays_of_a_step()):
-        if travel == (1.0, 0.0, 0.0):
-            assert cells[number, 1, 1, 3] == pytest.approx(1 - 0.25 - 0.5 * ray[0])
-            assert (cells[number, 1, 1, [1, 2, 4, 5]] == 1).all()
-        if travel == (-1.0, 0.0, 0.0):  # the wall's other side is not there
-            assert (cells[number] == 1).all()
-    state = injection(grid, [[0.1, 1.5, 1.5]], [[1, 0, 0]], [[1, 1, 1]])
-    lists = [mi.Float(np.ascontiguousarray(share)) for share in shares]
-    free, blocked = (
-        values(grid, spread(grid.arrays, state, let_through, 5, grid.size))[0]
-        for let_through in (None, lists)
+def test_walls_within_a_larger_grid_keep_light_in():
+    """As if the grid ended with them, but for the first step, which nothing blocks."""
+    counts = np.array((8, 8, 8))
+    walls = box_sides((1, 1, 1), counts + 1, 0.25, inwards=True)
+    grid = Grid((0.0, 0.0, 0.0), 0.25, tuple((counts + 2).tolist()))
+    found = received(grid, *walls, 96, shares_of(grid, *walls))
+    assert found.mean() == pytest.approx(1, abs=0.05)
+
+
+def test_a_block_in_a_white_room_receives_what_it_sends_out():
+    """So do the walls. Where nothing blocks light, it goes through the block and lights it from within."""
+    counts = (12, 12, 8)
+    low, high = np.array((4, 4, 0)), np.array((8, 8, 4))
+    grid = Grid((0.0, 0.0, 0.0), 0.25, counts)
+    walls, block = (
+        box_sides((0, 0, 0), counts, 0.25, inwards=True),
+        box_sides(low, high, 0.25, inwards=False),
     )
-    assert blocked[4:].sum() < 0.4 * free[4:].sum()
+    kept = []
+    for points, normals in (walls, block):
+        under = (points[:, 2] == 0) & ((points > 0.25 * low)[:, :2] & (points < 0.25 * high)[:, :2]).all(
+            axis=1
+        )
+        kept.append((points[~under], normals[~under]))
+    points, normals = (np.concatenate(parts) for parts in zip(*kept, strict=True))
+    of_walls = len(kept[0][0])
+    free = received(grid, points, normals, 96)
+    found = received(grid, points, normals, 96, shares_of(grid, points, normals))
+    assert found[:of_walls].mean() == pytest.approx(1, abs=0.05)
+    assert found[of_walls:].mean() == pytest.approx(1, abs=0.1)
+    assert free[of_walls:].mean() > 1.3
+
+
+def sheet(place, normal, parts=4):
+    """A sheet across a grid of (6, 3, 3) cells of 1 m: points, normals and areas of its pieces."""
+    ticks = (np.arange(3 * parts) + 0.5) / parts
+    y, z = (part.ravel() for part in np.meshgrid(ticks, ticks))
+    points = np.stack([np.full(len(y), place), y, z], axis=1)
+    return points, np.tile(np.array(normal, dtype=float), (len(y), 1)), np.full(len(y), parts**-2.0)
+
+
+ACROSS = Grid((0.0, 0.0, 0.0), 1.0, (6, 3, 3))
+
+
+@pytest.mark.parametrize("place", [2.6, 3.0, 3.4])
+@pytest.mark.parametrize(("travel", "into"), [(1.0, 3), (-1.0, 2)])
+def test_a_wall_blocks_what_comes_towards_its_front(place, travel, into):
+    """On the nearest face between cells, whole; what passes along it, and what comes from behind, goes on."""
+    shares = passing(ACROSS, *sheet(place, (-travel, 0, 0))).reshape(6, 3, 3, 6)
+    expected = np.ones_like(shares)
+    expected[AXES.index((travel, 0.0, 0.0)), :, :, into] = 0
+    np.testing.assert_allclose(shares, expected, atol=1e-6)
+
+
+def test_a_tilted_piece_covers_what_it_is_seen_as():
+    points, normals, _ = sheet(3.0, (-0.6, 0.0, 0.8), parts=1)
+    shares = passing(ACROSS, points + np.array([0, 0, 0.2]), normals, np.full(len(points), 0.5)).reshape(
+        6, 3, 3, 6
+    )
+    assert shares[AXES.index((1.0, 0.0, 0.0)), :, :, 3] == pytest.approx(0.7)
+    assert shares[AXES.index((0.0, 0.0, -1.0)), :, :, 3] == pytest.approx(0.6)
+    assert shares.sum() == pytest.approx(6 * ACROSS.size - 9 * 0.3 - 9 * 0.4)
+
+
+def test_light_stays_on_its_side_of_a_sheet():
+    """However thin it is; what passes along its faces is not weakened."""
+    sides = [sheet(3.0, normal) for normal in ((-1, 0, 0), (1, 0, 0))]
+    pieces = [np.concatenate(parts) for parts in zip(*sides, strict=True)]
+    shares = [mi.Float(np.ascontiguousarray(share)) for share in passing(ACROSS, *pieces)]
+    state = injection(ACROSS, [[0.1, 1.5, 1.5]], [[1, 0, 0]], [[1, 1, 1]])
+    free, blocked = (
+        values(ACROSS, spread(ACROSS.arrays, state, let_through, 32, ACROSS.size))[0]
+        for let_through in (None, shares)
+    )
+    assert free[3:].sum() > 0.05 * free.sum()
+    assert not blocked[3:].any()
     assert blocked[:2].sum() == pytest.approx(free[:2].sum(), rel=0.05)
 
 
 def test_full_cover_lets_nothing_through_twice():
-    """Shares stay in [0, 1] however much lies in a cell."""
-    cover = np.full((3, 3, 3, 4), 50.0, dtype=np.float32)
-    shares = passing(Grid((0.0, 0.0, 0.0), 1.0, (2, 2, 2)), cover)
-    assert set(np.unique(shares)) <= {0.0, 1.0}
+    """Shares stay in [0, 1] however much lies in a cell, and nothing at all covers nothing."""
+    points, normals, areas = sheet(3.0, (-1, 0, 0))
+    assert set(np.unique(passing(ACROSS, points, normals, 50 * areas))) == {0.0, 1.0}
+    assert (passing(ACROSS, points[:0], normals[:0], areas[:0]) == 1).all()
 
 
 def test_a_grid_fills_its_box_and_has_no_cell_too_many():
