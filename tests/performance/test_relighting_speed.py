@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from functools import partial
 
+import numpy as np
 import pytest
 import torch
 
+from gibench.baselines.neural_free_viewpoint_relighting.draws import Draw, Important
 from gibench.baselines.neural_free_viewpoint_relighting.inputs import coded
 from gibench.baselines.neural_free_viewpoint_relighting.network import (
     FULL,
@@ -14,6 +16,8 @@ from gibench.baselines.neural_free_viewpoint_relighting.network import (
     HashField,
     TransportNetwork,
 )
+from gibench.baselines.relighting.examples import Seen
+from gibench.baselines.wavelets.haar import haar
 from tests.performance.turns import seconds
 
 pytestmark = pytest.mark.performance
@@ -61,3 +65,41 @@ def test_a_frame(name, size, table):
     assert times[64] < unfolded
     if name == "small":
         assert times[64] <= MOST_SECONDS
+
+
+class OneFrame:
+    """A frame of PIXELS, under noise on faces of 32 × 32."""
+
+    def __init__(self):
+        generator = torch.Generator().manual_seed(0)
+        widths = (3, 13, 3)
+        points, *halves = (torch.rand(PIXELS, width, generator=generator) for width in widths)
+        detail = torch.rand(PIXELS, generator=generator)
+        self.frame = Seen(points, *(part.half() for part in (*halves, detail)))
+        self.light = haar(np.random.default_rng(0).gamma(0.5, size=(6, 32, 32, 3)))
+
+    def __len__(self):
+        return 1
+
+    def __getitem__(self, index):
+        return self.frame, self.light
+
+    def seen(self, index):
+        return self.frame
+
+
+def test_what_a_step_draws():
+    """Chances are summed up once a frame: after that a draw by them costs about as much as one of any pixels."""
+    draw, random, plain = Draw(512, 96), np.random.default_rng(0), OneFrame()
+    examples = Important(plain)
+    first, later, uniform = seconds(
+        lambda: draw((plain.frame, plain.light, examples._sums(plain.frame)), random),
+        lambda: draw(examples[0], random),
+        lambda: draw(plain[0], random),
+        repeats=9,
+    )
+    print(
+        f"\na draw of 512 pixels and 96 wavelets: {1e3 * later:.1f} ms, {first / later:.1f} times as long the first "
+        f"time, {uniform / later:.2f} times as long of any pixels"
+    )
+    assert later < first / 2

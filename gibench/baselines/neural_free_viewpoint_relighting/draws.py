@@ -13,7 +13,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from gibench.baselines.relighting.examples import CODE, Example, Light, Seen, evenly, some_of
+from gibench.baselines.relighting.examples import CODE, KEPT, Example, Examples, Light, Seen, evenly, some_of
 from gibench.baselines.relighting.surfaces import MATERIAL
 from gibench.baselines.wavelets.light import chosen_light, light_at
 from gibench.baselines.wavelets.selection import Weighting, largest
@@ -23,6 +23,9 @@ CELLS = 64
 
 WEIGHTING: Weighting = "area"
 """By which the largest wavelets of a step are chosen, and those of a frame by default."""
+
+MOST_SUMS = KEPT // 4
+"""Bytes of sums of chances that are kept."""
 
 NEXT = 200
 """Wavelets that come after the largest ones of a step: of which frames of more wavelets than a step has are made."""
@@ -62,29 +65,78 @@ def _cells(points: Tensor) -> NDArray[np.int64]:
     return np.asarray((x * CELLS + y) * CELLS + z)
 
 
+class Important:
+    """Examples with where to look in each, worked out once a frame: three rows of sums of chances, from pixel to pixel,
+    by disagreement, by detail, and by how much and how sharply a surface reflects.
+    """
+
+    def __init__(self, examples: Examples) -> None:
+        """examples: all of which are looked at here, for what they disagree about."""
+        self.examples = examples
+        self.disagreement = Disagreement(examples.seen(index) for index in range(len(examples)))
+        self._kept: dict[int, NDArray[np.float32]] = {}
+        self._bytes = 0
+
+    def __len__(self) -> int:
+        """How many."""
+        return len(self.examples)
+
+    def __getitem__(self, index: int) -> tuple[Seen, Light, NDArray[np.float32]]:
+        """A frame, its light, and sums (3, N) of chances; those that fit into MOST_SUMS bytes are kept."""
+        seen, light = self.examples[index]
+        if index in self._kept:
+            return seen, light, self._kept[index]
+        sums = self._sums(seen)
+        if self._bytes + sums.nbytes <= MOST_SUMS:
+            self._kept[index] = sums
+            self._bytes += sums.nbytes
+        return seen, light, sums
+
+    def _sums(self, seen: Seen) -> NDArray[np.float32]:
+        _, _, roughness, _, specular = seen.material.float().split(list(MATERIAL.values()), dim=1)
+        gloss = specular.mean(dim=1) * (1 - roughness[:, 0]).clamp(min=0)
+        return sums_of(np.stack([self.disagreement.at(seen.points), seen.detail.numpy(), gloss.numpy()]))
+
+
+def sums_of(chances: NDArray[np.floating]) -> NDArray[np.float32]:
+    """(K, N) sums of chances (K, N) ≥ 0 up to each pixel and with it, in shares of all, for `_by_chance`.
+
+    A row in which all are 0 becomes that of equal chances.
+    """
+    sums = np.cumsum(chances, axis=1, dtype=np.float64)
+    if not sums.size:
+        return sums.astype(np.float32)
+    nothing = ~(sums[:, -1] > 0)
+    sums[nothing] = np.arange(1, sums.shape[1] + 1)
+    return (sums / sums[:, -1:]).astype(np.float32)
+
+
 @dataclass(frozen=True)
 class Draw:
     """Draws what a step sees of a frame (section 5).
 
-    pixels: how many. learned: how many wavelets, half of them the largest of the light times their area, a quarter of
-    them of the NEXT ones, a quarter any others. What is learned must explain all of the light of a frame, and light of
-    low frequency is most of that of a matt surface: so what a step is told of must hold it.
-    disagreement: None to look at all pixels alike; otherwise a quarter of them is drawn so, and a quarter each by
-    disagreement, by detail, and by how much and how sharply a surface reflects.
+    pixels: how many. Where an example comes with sums of chances, a quarter of them is drawn from all alike, and a
+    quarter by each row of those. learned: how many wavelets, half of them the largest of the light times their area, a
+    quarter of them of the NEXT ones, a quarter any others. What is learned must explain all of the light of a frame,
+    and light of low frequency is most of that of a matt surface: so what a step is told of must hold it.
     """
 
     pixels: int
     learned: int
-    disagreement: Disagreement | None
 
-    def __call__(self, example: tuple[Seen, Light], random: np.random.Generator) -> Example:
+    def __call__(
+        self,
+        example: tuple[Seen, Light] | tuple[Seen, Light, NDArray[np.float32]],
+        random: np.random.Generator,
+    ) -> Example:
         """Of a frame and its light. One that sees no surface gives pixels that are black in truth."""
-        seen, coefficients = example
+        seen, coefficients, *sums = example
         light = light_at(coefficients, self._places(coefficients, random))
         if not len(seen.points):
             seen = Seen(*(torch.zeros(1, *part.shape[1:]) for part in seen))
             light = light._replace(weights=np.zeros_like(light.weights))
-        truth, *surface = some_of(seen, torch.from_numpy(self._drawn(seen, random)))
+        drawn = self._drawn(len(seen.points), sums[0] if sums and sums[0].size else None, random)
+        truth, *surface = some_of(seen, torch.from_numpy(drawn))
         return Example(truth, (*surface, *map(torch.from_numpy, light)))
 
     def _places(self, coefficients: NDArray[np.float64], random: np.random.Generator) -> NDArray[np.int64]:
@@ -97,26 +149,23 @@ class Draw:
         rest = np.setdiff1d(np.arange(count), chosen, assume_unique=True)
         return np.concatenate([chosen, random.choice(rest, learned - len(chosen), replace=False)])
 
-    def _drawn(self, seen: Seen, random: np.random.Generator) -> NDArray[np.int64]:
-        count = len(seen.points)
-        if self.disagreement is None:
+    def _drawn(
+        self, count: int, sums: NDArray[np.float32] | None, random: np.random.Generator
+    ) -> NDArray[np.int64]:
+        if sums is None:
             return random.integers(count, size=self.pixels)
-        _, _, roughness, _, specular = seen.material.float().split(list(MATERIAL.values()), dim=1)
-        gloss = specular.mean(dim=1) * (1 - roughness[:, 0]).clamp(min=0)
-        chances = (self.disagreement.at(seen.points), seen.detail.numpy(), gloss.numpy())
-        share = self.pixels // 4
-        drawn = [random.integers(count, size=self.pixels - 3 * share)]
-        drawn += [_by_chance(chance.astype(np.float64), share, random) for chance in chances]
+        share = self.pixels // (1 + len(sums))
+        drawn = [random.integers(count, size=self.pixels - len(sums) * share)]
+        drawn += [_by_chance(row, share, random) for row in sums]
         return np.concatenate(drawn)
 
 
-def _by_chance(chance: NDArray[np.float64], size: int, random: np.random.Generator) -> NDArray[np.int64]:
-    """(size,) numbers, as often as their chance ≥ 0 says; any where all are 0."""
-    edges = np.cumsum(chance)
-    if not edges[-1] > 0:
-        return random.integers(len(chance), size=size)
-    found = np.searchsorted(edges, random.random(size) * edges[-1], side="right")
-    return np.minimum(found, len(chance) - 1)
+def _by_chance(sums: NDArray[np.float32], size: int, random: np.random.Generator) -> NDArray[np.int64]:
+    """(size,) numbers, as often as sums of `sums_of` (N,) say. No array of N is made: random numbers of another type
+    would have the sums converted.
+    """
+    found = np.searchsorted(sums, random.random(size, dtype=np.float32), side="right")
+    return np.minimum(found, len(sums) - 1)
 
 
 def spread(example: tuple[Seen, Light], pixels: int, wavelets: int) -> Example:

@@ -10,7 +10,7 @@ import numpy as np
 from torch import Tensor, nn
 
 from gibench.baselines.method import Setting
-from gibench.baselines.neural_free_viewpoint_relighting.draws import Disagreement, Draw, spread
+from gibench.baselines.neural_free_viewpoint_relighting.draws import Draw, Important, spread
 from gibench.baselines.neural_free_viewpoint_relighting.network import (
     FULL,
     SMALL,
@@ -75,11 +75,8 @@ class WaveletTransport(RelightingLearner):
         self, network: TransportNetwork, examples: Examples, apart: Examples, plan: TrainingPlan
     ) -> None:
         """network: of the plan, on its device. apart: what is held out."""
-        disagreement = None
-        if plan.important:
-            disagreement = Disagreement(examples.seen(index) for index in range(len(examples)))
-        self.drawing = Draw(max(1, plan.pixels // FRAMES), plan.learned, disagreement)
-        super().__init__(network, examples, apart, plan.seed)
+        self.drawing = Draw(max(1, plan.pixels // FRAMES), plan.learned)
+        super().__init__(network, Important(examples) if plan.important else examples, apart, plan.seed)
 
     def draw(self, example: tuple[Seen, Light], random: np.random.Generator) -> Example:
         """By the four strategies."""

@@ -11,6 +11,7 @@ import torch
 from torch import Tensor, nn
 
 from gibench.baselines.relighting.examples import CODE, Example, Examples, Light, Seen
+from gibench.baselines.training.batches import Examples as Drawn
 from gibench.baselines.training.batches import batches
 from gibench.baselines.training.learner import Learner, Step
 from gibench.baselines.training.loop import Batches
@@ -38,8 +39,8 @@ class RelightingLearner(Learner):
     epsilon: ClassVar[float] = 1e-8
     """Of Adam."""
 
-    def __init__(self, network: nn.Module, examples: Examples, apart: Examples, seed: int) -> None:
-        """network: on its device. apart: what is held out."""
+    def __init__(self, network: nn.Module, examples: Drawn, apart: Examples, seed: int) -> None:
+        """network: on its device. examples: what `draw` is given. apart: what is held out."""
         self.examples, self.network, self.seed = examples, network, seed
         optimiser = torch.optim.Adam(network.parameters(), lr=self.rate, eps=self.epsilon)
         super().__init__({"network": network}, {"network": optimiser})

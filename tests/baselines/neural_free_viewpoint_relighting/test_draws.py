@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 import torch
 
-from gibench.baselines.neural_free_viewpoint_relighting.draws import NEXT, Disagreement, Draw, spread
+from gibench.baselines.neural_free_viewpoint_relighting import draws
+from gibench.baselines.neural_free_viewpoint_relighting.draws import (
+    NEXT,
+    Disagreement,
+    Draw,
+    Important,
+    spread,
+    sums_of,
+)
 from gibench.baselines.relighting.examples import Seen
 from gibench.baselines.wavelets.haar import haar
 from gibench.baselines.wavelets.selection import largest
@@ -27,10 +35,21 @@ def frame(truth, material=None, detail=None, points=None):
     )
 
 
-def drawn(seen, disagreement, pixels=400):
-    """How often each pixel is drawn."""
-    draw = Draw(pixels, 8, disagreement)
-    return np.bincount(draw._drawn(seen, np.random.default_rng(0)), minlength=len(seen.points))
+class Frames(Made):
+    """Some frames, under noise."""
+
+    def __init__(self, *frames):
+        super().__init__(1)
+        ((_, light),) = self.frames
+        self.frames = [(seen, light) for seen in frames]
+
+
+def drawn(examples, pixels=400):
+    """How often each pixel of the first of them is drawn."""
+    seen, _, *sums = examples[0]
+    draw = Draw(pixels, 8)
+    found = draw._drawn(len(seen.points), sums[0] if sums else None, np.random.default_rng(0))
+    return np.bincount(found, minlength=len(seen.points))
 
 
 def test_a_quarter_each_where_views_disagree_where_there_is_detail_and_gloss():
@@ -41,7 +60,7 @@ def test_a_quarter_each_where_views_disagree_where_there_is_detail_and_gloss():
     material = frame(one).material.clone()
     material[20, 6], material[20, 10:] = 0.05, 0.9
     seen = frame(one, material, detail)
-    counts = drawn(seen, Disagreement([seen, frame(other)]))
+    counts = drawn(Important(Frames(seen, frame(other))))
     assert counts.sum() == 400
     assert counts[7] > 90  # beside its share of the uniform quarter
     assert counts[11] >= 100
@@ -52,10 +71,39 @@ def test_a_quarter_each_where_views_disagree_where_there_is_detail_and_gloss():
 
 def test_without_importance_and_without_anything_important_all_pixels_are_alike():
     seen = frame(torch.full((40,), 0.5))
-    for disagreement in (None, Disagreement([seen])):
-        counts = drawn(seen, disagreement, 4000)
+    for examples in (Frames(seen), Important(Frames(seen))):
+        counts = drawn(examples, 4000)
         assert counts.min() > 60
         assert counts.max() < 150
+
+
+def test_chances_are_summed_up_once_a_frame(monkeypatch):
+    asked = []
+    monkeypatch.setattr(draws, "sums_of", lambda chances: asked.append(1) or sums_of(chances))
+    examples = Important(Made(2))
+    draw, random = Draw(16, 8), np.random.default_rng(0)
+    for index in (0, 1, 0, 1, 0):
+        draw(examples[index], random)
+    assert len(asked) == 2
+    assert examples[0][2] is examples[0][2]
+    assert (
+        examples[0][2].dtype == np.float32
+    )  # as the random numbers are, or each search would convert all of it
+    monkeypatch.setattr(draws, "MOST_SUMS", 1)
+    few = Important(Made(2))
+    assert few[0][2] is not few[0][2]
+
+
+def test_pixels_without_a_chance_are_never_drawn_and_others_as_often_as_theirs_says():
+    chances = np.array([[0.0, 1.0, 0.0, 3.0, 0.0], [0.0, 0.0, 0.0, 0.0, 0.0], [1e-30, 0.0, 0.0, 0.0, 1e-30]])
+    sums = sums_of(chances)
+    count = 40_000
+    found = [
+        np.bincount(draws._by_chance(row, count, np.random.default_rng(0)), minlength=5) / count
+        for row in sums
+    ]
+    np.testing.assert_allclose(found, [[0, 0.25, 0, 0.75, 0], [0.2] * 5, [0.5, 0, 0, 0, 0.5]], atol=0.01)
+    assert not found[0][[0, 2, 4]].any()
 
 
 def test_a_brighter_environment_is_no_disagreement():
@@ -66,15 +114,15 @@ def test_a_brighter_environment_is_no_disagreement():
 
 def test_half_of_the_wavelets_are_the_largest_by_area_and_none_comes_twice():
     seen, coefficients = Made(1)[0]
-    example = Draw(16, 40, None)((seen, coefficients), np.random.default_rng(1))
+    example = Draw(16, 40)((seen, coefficients), np.random.default_rng(1))
     places = example.inputs[2].numpy()
     assert len(np.unique(places)) == 40
     np.testing.assert_array_equal(places[:20], largest(coefficients, 20, "area"))
     assert example.inputs[3].shape == (40, 3)
     assert example.truth.shape == (16, 3)
-    again = Draw(16, 40, None)((seen, coefficients), np.random.default_rng(1))
+    again = Draw(16, 40)((seen, coefficients), np.random.default_rng(1))
     assert torch.equal(again.inputs[2], example.inputs[2])
-    few = Draw(16, 1000, None)((seen, coefficients), np.random.default_rng(1))  # of 96
+    few = Draw(16, 1000)((seen, coefficients), np.random.default_rng(1))  # of 96
     assert len(np.unique(few.inputs[2].numpy())) == 96
 
 
@@ -92,7 +140,7 @@ def test_the_light_of_a_step_is_the_light_of_its_frame(irradiance, name):
     """The irradiance that 20 surfaces get from the wavelets of a step, beside that from the whole of a real map."""
     (file,) = environment_files(name)
     coefficients = haar(to_cubemap(read_environment(file.path), 32).astype(np.float64))
-    places = Draw(16, 96, None)._places(coefficients, np.random.default_rng(0))
+    places = Draw(16, 96)._places(coefficients, np.random.default_rng(0))
     light = coefficients.reshape(-1, 3)
     share = (irradiance[places].T @ light[places]) / (irradiance.T @ light)
     assert (
@@ -105,7 +153,7 @@ def test_a_quarter_of_the_wavelets_come_next_and_a_quarter_are_any():
     coefficients = haar(np.random.default_rng(0).gamma(0.5, size=(6, 32, 32, 3)))
     in_order = largest(coefficients, 6 * 32**2, "area")
     rank = np.argsort(in_order)
-    places = Draw(16, 96, None)._places(coefficients, np.random.default_rng(0))
+    places = Draw(16, 96)._places(coefficients, np.random.default_rng(0))
     assert len(np.unique(places)) == 96
     assert (np.sort(rank[places[:48]]) == np.arange(48)).all()
     assert (rank[places[48:72]] < 48 + NEXT).all()
@@ -115,7 +163,7 @@ def test_a_quarter_of_the_wavelets_come_next_and_a_quarter_are_any():
 def test_a_frame_that_sees_nothing_is_black():
     seen, coefficients = Made(1)[0]
     empty = Seen(*(part[:0] for part in seen))
-    example = Draw(16, 8, Disagreement([empty]))((empty, coefficients), np.random.default_rng(0))
+    example = Draw(16, 8)(Important(Frames(empty))[0], np.random.default_rng(0))
     assert not example.truth.any()
     assert not example.inputs[3].any()
     assert spread((empty, coefficients), 10, 8).inputs[0].shape == (0, 3)

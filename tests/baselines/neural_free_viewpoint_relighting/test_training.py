@@ -8,6 +8,7 @@ import pytest
 import torch
 
 from gibench.baselines.neural_free_viewpoint_relighting import METHOD
+from gibench.baselines.neural_free_viewpoint_relighting.draws import Important
 from gibench.baselines.neural_free_viewpoint_relighting.network import FULL, HashField
 from gibench.baselines.neural_free_viewpoint_relighting.training import TrainingPlan, WaveletTransport
 from gibench.baselines.training.budget import Budget
@@ -64,7 +65,7 @@ def test_variants_are_what_they_say(variant):
     made = plan(**(variant.settings if variant else {}))
     learner = learner_of(Made(1, 20), Made(1, 20), made)
     name = variant.name if variant else ""
-    assert (learner.drawing.disagreement is None) == (name == "uniform-pixels")
+    assert isinstance(learner.examples, Important) == (name != "uniform-pixels")
     assert learner.network.first.in_features == 32 + 13 + (0 if name == "no-encoding" else 16)
 
 
