@@ -28,6 +28,11 @@ from gibench.baselines.training.schedule import half_cosine, set_rate
 CONTENT, PERCEPTUAL, ADVERSARIAL = 0.7, 0.28, 0.02
 """Weights of the losses, ω (section 3.4)."""
 
+BEND = 0.02
+"""Difference of log(1 + light) below which smooth L1 bends. They are about 0.1: bent at 1, it would be half their
+square, with a tenth of the gradient, and VGG16 would outweigh it.
+"""
+
 RATE, DISCRIMINATOR_RATE, DISCRIMINATOR_BETA = 1e-3, 2e-4, 0.5
 """Of Adam for the network, which falls along half a cosine to nothing, and of Adam for the discriminator, with
 its β₁.
@@ -36,9 +41,9 @@ its β₁.
 LARGEST_GRADIENT = 1.0
 """Norm that gradients of the network are cut down to."""
 
-LOOKED_EVERY, LOOKED_SIDE = 4, 64
-"""Steps from one with the perceptual and the adversarial loss to the next, each with as much more weight, and pixels
-along a side of what they look at: they cost more than all else.
+LOOKED_FROM, LOOKED_EVERY, LOOKED_SIDE = 0.8, 4, 64
+"""Share of the training after which there are the perceptual and the adversarial loss, steps from one with them to the
+next, each with as much more weight, and pixels along a side of what they look at: they cost more than all else.
 """
 
 EPOCHS = 80
@@ -132,10 +137,10 @@ class IndirectLight(Learner):
         truth = in_units(demodulated(batch["truth"], inputs.albedo), inputs.unit)
         truth = torch.where(lit, truth, light.detach())
         made, true = torch.log1p(light), torch.log1p(truth)
-        content = smooth_absolute(made, true)
+        content = smooth_absolute(made, true, bend=BEND)
         losses = {"content": content}
         loss = CONTENT * content
-        looked = now.number % LOOKED_EVERY == 0
+        looked = now.progress >= LOOKED_FROM and now.number % LOOKED_EVERY == 0
         window = random_window(made.shape[-2:], LOOKED_SIDE, now.random) if looked else None
         if self.features is not None and window is not None:
             shown = _shown(batch, inputs.radiance_of(light))

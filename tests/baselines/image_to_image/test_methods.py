@@ -11,7 +11,7 @@ import torch
 from gibench.baselines.image_to_image import implementation
 from gibench.baselines.image_to_image.examples import READ, Draw, Examples, inputs_of
 from gibench.baselines.image_to_image.frames import Frames
-from gibench.baselines.image_to_image.learner import IndirectLight, TrainingPlan
+from gibench.baselines.image_to_image.learner import LOOKED_EVERY, IndirectLight, TrainingPlan
 from gibench.baselines.image_to_image.shading import (
     FARTHEST,
     GEOMETRY,
@@ -19,6 +19,7 @@ from gibench.baselines.image_to_image.shading import (
     brightness,
     demodulated,
     geometry,
+    in_units,
     indirect,
 )
 from gibench.baselines.image_to_image.units import Units
@@ -127,7 +128,8 @@ def test_a_step_of_each(views, name):
     assert np.isfinite(before)
     batch = next(iter(learner.batches()(0)))
     assert batch["direct"].shape == (2, 3, 32, 32)
-    losses = learner.step(batch, Step(0, 0.0, np.random.default_rng(0)))
+    assert list(learner.step(batch, Step(0, 0.7, np.random.default_rng(0)))) == ["loss", "content"]
+    losses = learner.step(batch, Step(0, 0.9, np.random.default_rng(0)))
     assert list(losses) == ["loss", "content", "perceptual", "adversarial", "judge"]
     assert all(torch.isfinite(loss) for loss in losses.values())
     assert learner.look() != before
@@ -201,6 +203,45 @@ def test_frames_without_direct_light_teach_nothing(views):
     batch = {**batch, "direct": 0 * batch["direct"], "unit": 0 * batch["unit"]}
     losses = learner.step(batch, Step(0, 0.0, np.random.default_rng(0)))
     assert losses["content"] == 0
+
+
+class Brighter(torch.nn.Module):
+    """Says the true indirect light, so many times as bright in all of an image."""
+
+    def __init__(self, factor):
+        super().__init__()
+        self.shift = torch.nn.Parameter(torch.tensor(factor).log())
+        self.truth = None
+
+    def forward(self, light, geometry):
+        return self.truth.clamp(min=1e-6).log() + self.shift
+
+
+def test_content_leads_where_all_is_too_bright(views):
+    """Of the gradient along brightness it has half at least over a training, where light is 30 % too bright."""
+    frames = Examples(Frames(views, READ), Units())
+    network = Brighter(1.3)
+    network.truth = torch.ones(1, 3, 1, 1)
+    learner = IndirectLight(network, frames, frames, TrainingPlan(40, 1, True, False, 0))
+    gradients = {}
+
+    def kept(name, loss, **_):
+        gradients[name] = float(torch.autograd.grad(loss, network.shift)[0])
+
+    learner.descend = kept
+    for number in range(len(frames)):
+        batch = {name: image[None] for name, image in inputs_of(frames[number]).items()}
+        inputs = Inputs.of(batch["direct"], batch["albedo"], batch["geometry"], batch["unit"])
+        network.truth = in_units(demodulated(batch["truth"], inputs.albedo), inputs.unit)
+        found = []
+        for step in range(10 * LOOKED_EVERY):
+            learner.step(batch, Step(step, step / (10 * LOOKED_EVERY), np.random.default_rng(step)))
+            found.append(gradients["network"])
+        # Steps without VGG16 have content alone.
+        content, both = found[1], sum(found) / len(found)
+        assert content > 0
+        assert both > 1.01 * content
+        assert content >= 0.5 * both
 
 
 def test_what_a_step_sees(views):

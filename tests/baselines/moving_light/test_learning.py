@@ -196,10 +196,11 @@ def test_a_colour_that_the_light_lacks_teaches_nothing(room):
     batch = next(iter(learner.batches()(0)))
     blue = torch.tensor([0.0, 0, 1])[:, None, None]
     losses = learner.step(
-        {**batch, "unit": batch["unit"] * (1 - blue)}, Step(0, 0.0, np.random.default_rng(0))
+        {**batch, "unit": batch["unit"] * (1 - blue)}, Step(0, 0.9, np.random.default_rng(0))
     )
     assert all(torch.isfinite(loss) for loss in losses.values())
     assert losses["content"] > 0
+    assert losses["adversarial"] > 0
     gradient = learner.network.last.weight.grad
     assert gradient[:2].any()
     assert not gradient[2].any()
