@@ -105,6 +105,7 @@ class IndirectLight(Learner):
                 discriminator.parameters(), lr=DISCRIMINATOR_RATE, betas=(DISCRIMINATOR_BETA, 0.999)
             )
         self.features = Vgg16Features().to(device) if plan.perceptual else None
+        self.anew_at = LOOKED_FROM if plan.perceptual or plan.adversarial else 0.0
         super().__init__(networks, optimisers, product=["network"])
 
     def batches(self, processes: int = 0) -> Batches:
