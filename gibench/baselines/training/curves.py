@@ -29,10 +29,10 @@ class Look:
 class Trained:
     """The end of a training.
 
-    weights: those with the smallest held-out error, the earliest of equal ones, by network and name. best: the look at
-    them; its step is 0 where the networks as they were built are the best. plans: how learning rates were laid out; the
-    last one holds to the end. steps: those that were made. seconds: in all; of these, before: in runs cut off, waited:
-    for data.
+    weights: those with the smallest held-out error since `Learner.anew_at`, the earliest of equal ones, by network and
+    name. best: the look at them; its step is 0 where the networks as they were built are the best. plans: how learning
+    rates were laid out; the last one holds to the end. steps: those that were made. seconds: in all; of these, before:
+    in runs cut off, waited: for data.
     """
 
     weights: Weights

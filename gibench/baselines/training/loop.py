@@ -216,7 +216,7 @@ class _Run:
         self.sums = [0.0, 0]
         look = Look(self.step, ended - self.started, error, total / count if count else 0.0)
         progress = self._progress()
-        anew = self.best_at < self.learner.anew_at <= progress
+        anew = self.best_at < self.learner.anew_at <= progress and math.isfinite(error)
         if not self.curve or error < self.best.error or anew:
             self.best, self.best_at, self.weights = look, progress, self.learner.weights()
         self.curve.append(look)

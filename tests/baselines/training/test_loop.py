@@ -323,6 +323,14 @@ def test_weights_of_before_another_loss_are_given_up():
     assert (trained.best.step, trained.best.error) == (9, 6)
 
 
+def test_weights_without_a_held_out_error_take_the_place_of_none():
+    errors = iter([9.0, 8, 7, 6, 5, 4, 3, 2, math.nan, math.nan, math.nan])
+    learner = Fit()
+    learner.anew_at, learner.error = 0.8, lambda: next(errors)
+    trained = train(learner, points(), Budget(steps=10, look_every=1), seed=0)
+    assert (trained.best.step, trained.best.error) == (7, 2)
+
+
 def test_patience_ends_it():
     learner = Fit(rate=0.0)
     trained = train(learner, points(), Budget(steps=1000, look_every=5, patience=20), seed=0)
