@@ -110,6 +110,11 @@ class AreaLight:
         return matrix
 
     @property
+    def intensity(self) -> NDArray[np.float64]:
+        """(3,), W·sr⁻¹: radiant intensity in its direction, radiance times area."""
+        return np.array(self.radiance) * self.area
+
+    @property
     def luminous_flux(self) -> float:
         """Lumens: 683 lm/W · π · area · luminance of its radiance."""
         return float(683.0 * math.pi * self.area * (LUMINANCE @ np.array(self.radiance)))

@@ -36,6 +36,7 @@ def test_a_light_is_a_rectangle_with_its_front_along_its_direction(direction, up
 def test_a_light_of_known_flux():
     radiance = 1000 / (683 * np.pi * 0.5)
     assert AreaLight((0, 0, 0), (0, 0, 1), 1.0, 0.5, (radiance,) * 3).luminous_flux == pytest.approx(1000)
+    assert AreaLight((0, 0, 0), (0, 0, 1), 1.0, 0.5, (4.0, 2.0, 0.0)).intensity.tolist() == [2, 1, 0]
 
 
 @pytest.mark.parametrize(

@@ -71,10 +71,10 @@ class AmbientLight(DirectLight):
 def light_of(lighting: Lighting) -> NDArray[np.float64]:
     """(3,), what the constant is multiplied by, for a brighter light makes a brighter room.
 
-    Radiance times area of an area light, W·sr⁻¹; mean radiance of an environment, W·m⁻²·sr⁻¹; 1 for the scene's own.
+    Intensity of an area light, W·sr⁻¹; mean radiance of an environment, W·m⁻²·sr⁻¹; 1 for the scene's own.
     """
     if lighting.area is not None:
-        return np.array(lighting.area.radiance) * lighting.area.area
+        return lighting.area.intensity
     if lighting.environment is not None:
         return mean_radiance(lighting.environment.panorama)
     return np.ones(3)

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from gibench.baselines.image_to_image.camera_space import in_camera_space, mirrored
 from gibench.baselines.image_to_image.frames import Frames, Images
-from gibench.baselines.image_to_image.shading import CHANNELS, demodulated, geometry
+from gibench.baselines.image_to_image.shading import CHANNELS, geometry
 from gibench.baselines.image_to_image.units import Units
 from gibench.baselines.training.crops import random_window
 
@@ -39,8 +39,7 @@ class Examples:
     def __getitem__(self, index: int) -> Images:
         """READ of a frame (C, H, W), "exposure" (1, 1, 1) and "unit" (1 or 3, 1, 1)."""
         images = in_camera_space(self.frames[index], self.frames.camera(index))
-        light = demodulated(images["direct_diffuse"], images["albedo"])
-        unit = self.units.of(light, self.frames.area_light(index))
+        unit = self.units.of(images["direct_diffuse"], images["albedo"], self.frames.area_light(index))
         return {**images, "exposure": torch.full((1, 1, 1), self.frames.exposure(index)), "unit": unit}
 
 

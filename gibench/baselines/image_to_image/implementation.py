@@ -13,7 +13,7 @@ from gibench.baselines.image_to_image.device_frames import DeviceFrames, channel
 from gibench.baselines.image_to_image.examples import READ, Examples
 from gibench.baselines.image_to_image.frames import Frames, held_out, share_of
 from gibench.baselines.image_to_image.learner import EPOCHS, IndirectLight, TrainingPlan
-from gibench.baselines.image_to_image.shading import CHANNELS, demodulated, geometry, indirect
+from gibench.baselines.image_to_image.shading import CHANNELS, geometry, indirect
 from gibench.baselines.image_to_image.units import Units
 from gibench.baselines.method import MethodError, Prediction, Setting, Site, Training, View, reading
 from gibench.baselines.sources import digest
@@ -97,7 +97,7 @@ class IndirectByNetwork(DirectLight):
         with stages.stage("inference"), torch.inference_mode():
             full, direct = (channels_first(parts[name]) for name in ("full", "direct_diffuse"))
             albedo = surfaces["albedo"]
-            unit = self._units.of(demodulated(direct, albedo), view.shot.lighting.area)
+            unit = self._units.of(direct, albedo, view.shot.lighting.area)
             made = indirect(self._network, direct[None], albedo[None], geometry(surfaces)[None], unit[None])[
                 0
             ]

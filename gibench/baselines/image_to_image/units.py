@@ -8,7 +8,6 @@ from torch import Tensor
 
 from gibench.baselines.image_to_image.frames import Frames, spaced
 from gibench.baselines.image_to_image.shading import brightness, demodulated, in_units
-from gibench.baselines.moving_light.measure import unit_of
 from gibench.rendering.lighting import AreaLight
 
 MEASURED = 64
@@ -39,17 +38,20 @@ class Units:
                 return Units()
             images = frames[number]
             light = demodulated(images["direct_diffuse"], images["albedo"])
-            given = unit_of(area).to(light)
+            given = light.new_tensor(area.intensity)[:, None, None]
             if (given > 0).any():
                 shares.append(float(in_units(light, given)[(given > 0).flatten()].mean()))
         mean = sum(shares) / max(len(shares), 1)
         return Units(mean) if mean > 0 else Units()
 
-    def of(self, light: Tensor, area: AreaLight | None) -> Tensor:
-        """Of direct light over albedo (3, H, W): (3, 1, 1), or its mean (1, 1, 1). area: the light of the frame."""
+    def of(self, direct: Tensor, albedo: Tensor, area: AreaLight | None) -> Tensor:
+        """Of a frame's direct light and albedo (3, H, W): (3, 1, 1), or (1, 1, 1), the mean of what is in view.
+
+        area: the light of the frame.
+        """
         if self.in_view is None or area is None:
-            return brightness(light)
-        return self.in_view * unit_of(area).to(light)
+            return brightness(demodulated(direct, albedo))
+        return direct.new_tensor(self.in_view * area.intensity)[:, None, None]
 
     @property
     def own(self) -> bool:

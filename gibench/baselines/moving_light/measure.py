@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from torch import Tensor
 
 from gibench.baselines.image_to_image.frames import Frames, Images, spaced
+from gibench.baselines.image_to_image.shading import in_units
 from gibench.baselines.training.codes import LogCode
 from gibench.baselines.training.errors import TrainingError
 from gibench.rendering.lighting import AreaLight
@@ -97,8 +98,7 @@ class Measure:
 
 def per_radiance(light: Tensor, area: AreaLight) -> Tensor:
     """Radiance (3, H, W) in units of that of an area light; 0 in colours that it has not."""
-    unit = light.new_tensor(area.radiance)[:, None, None]
-    return torch.where(unit > 0, light / torch.where(unit > 0, unit, 1), 0)
+    return in_units(light, light.new_tensor(area.radiance)[:, None, None])
 
 
 def per_flux(light: Tensor, area: AreaLight) -> Tensor:
@@ -108,7 +108,7 @@ def per_flux(light: Tensor, area: AreaLight) -> Tensor:
 
 def unit_of(area: AreaLight) -> Tensor:
     """(3, 1, 1): radiance of one unit of `per_flux`, W·m⁻²·sr⁻¹."""
-    return torch.tensor(area.radiance)[:, None, None] * area.area
+    return torch.tensor(area.intensity, dtype=torch.float32)[:, None, None]
 
 
 def area_of(frames: Frames, index: int) -> AreaLight:

@@ -138,9 +138,10 @@ def test_light_of_image_networks_is_in_units_of_what_the_light_gives_off(room):
     drawn = Draw(16, 0.0)(examples[0], np.random.default_rng(0))
     assert torch.equal(drawn["unit"], examples[0]["unit"])
     # Nothing is known of it where a light gives nothing, or nothing of it was ever in view.
-    light = demodulated(read[0][0]["direct_diffuse"], read[0][0]["albedo"])
-    assert torch.equal(Units().of(light, read[0][1]), brightness(light))
-    assert not units.of(light, dataclasses.replace(read[0][1], radiance=(0, 0, 0))).any()
+    direct, albedo = (read[0][0][name] for name in ("direct_diffuse", "albedo"))
+    light = demodulated(direct, albedo)
+    assert torch.equal(Units().of(direct, albedo, read[0][1]), brightness(light))
+    assert not units.of(direct, albedo, dataclasses.replace(read[0][1], radiance=(0, 0, 0))).any()
 
 
 @torch.no_grad()
@@ -160,7 +161,7 @@ def test_the_colour_of_the_light_is_that_of_the_prediction(room, name, tint, err
             area, radiance=tuple((light.flatten() * torch.tensor(area.radiance)).tolist())
         )
         direct, albedo = example["direct"] * light, example["albedo"]
-        unit = units.of(demodulated(direct, albedo), lamp)
+        unit = units.of(direct, albedo, lamp)
         return indirect(network, *(image[None] for image in (direct, albedo, example["geometry"], unit)))[0]
 
     white, tinted = made((1, 1, 1)), made(tint)
