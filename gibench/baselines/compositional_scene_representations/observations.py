@@ -65,11 +65,8 @@ class Observed:
         found = []
         for camera in self.cameras:
             images = frames.read(camera, (SIDE, SIDE))
-            found.append(
-                torch.cat(
-                    [images["albedo"], images["normal"], (images["distance"] / size).clamp(max=2 * FARTHEST)]
-                )
-            )
+            distance = (images["distance"] / size).clamp(max=2 * FARTHEST)
+            found.append(torch.cat([images["albedo"], images["normal"], distance]))
         return torch.stack(found)
 
     def light(self, area: AreaLight, measure: Measure, seed: int) -> Tensor:
