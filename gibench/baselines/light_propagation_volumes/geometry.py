@@ -28,10 +28,20 @@ TIE = 1e-3
 """Of the side of a cell: how far apart two faces are equally near."""
 
 
-def room_box(scene: Scene, margin: float = 0.02) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Corners (3,) of a box around the free space of the room; of the whole scene where nothing is enclosed.
+NEAR = 0.1
+"""Of the longest side of a room: how far from the end of its free space a wall may be."""
 
-    margin: that is added on each side, share of the longest one.
+LEAST_WALL = 0.2
+"""Of a side of the room that a wall must cover."""
+
+BINS = 200
+"""Places of a wall along the way that `NEAR` leaves it, on either side of the end of free space."""
+
+
+def room_grid(scene: Scene, cells: int) -> Grid:
+    """The grid over the room, `cells` along its longest side, or up to an eighth fewer: its faces lie on the walls.
+
+    Where nothing is enclosed, over the whole scene.
     """
     try:
         points = free_space(scene)
@@ -39,8 +49,43 @@ def room_box(scene: Scene, margin: float = 0.02) -> tuple[NDArray[np.float64], N
     except NoFreeSpace:
         box = scene.mi_scene.bbox()
         low, high = np.array(box.min, dtype=float).ravel(), np.array(box.max, dtype=float).ravel()
-    more = margin * max(float((high - low).max()), 1e-3)
-    return low - more, high + more
+    more = NEAR * max(float((high - low).max()), 1e-3)
+    around = Grid.around(low - more, high + more, cells)
+    return Grid.around(*walls(low, high, *surfaces(scene, around)), cells, low, high)
+
+
+def walls(
+    low: NDArray[Any], high: NDArray[Any], points: NDArray[Any], normals: NDArray[Any], areas: NDArray[Any]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Where the walls of a room are, floor and ceiling included: the corners (3,) of the box between them.
+
+    On each side that is where most surface lies that faces the room, near the end of its free space; that end itself
+    where hardly any does. Niches lie behind the walls, and cupboards before them.
+
+    low, high: of free space, (3,). points, normals, areas: of `surfaces`.
+    """
+    extent = high - low
+    near = NEAR * max(float(extent.max()), 1e-3)
+    found = np.array([low, high], dtype=float)
+    for side, ends in enumerate((low, high)):
+        for axis in range(3):
+            facing = normals[:, axis] * (1 - 2 * side) > 0.95
+            others = [a for a in range(3) if a != axis]
+            at = points[:, axis] - ends[axis]
+            chosen = facing & (np.abs(at) < near)
+            if not chosen.any():
+                continue
+            place = np.clip(np.floor((at[chosen] / near + 1) * BINS).astype(int), 0, 2 * BINS - 1)
+            total = np.bincount(place, areas[chosen], minlength=2 * BINS)
+            # A wall that lies where two bins meet is in both.
+            both = np.convolve(total, np.ones(3), mode="same")
+            best = int(np.argmax(both))
+            if both[best] >= LEAST_WALL * extent[others].prod():
+                of_wall = np.abs(place - best) <= 1
+                found[side, axis] = ends[axis] + np.average(
+                    at[chosen][of_wall], weights=areas[chosen][of_wall]
+                )
+    return found[0], found[1]
 
 
 def surfaces(scene: Scene, grid: Grid, rays: int = RAYS) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:

@@ -17,7 +17,7 @@ import numpy as np
 
 from gibench.baselines.first_hits import averaged, hits_of_rays
 from gibench.baselines.light_propagation_volumes.emission import lit_volume
-from gibench.baselines.light_propagation_volumes.geometry import passing, room_box, surfaces
+from gibench.baselines.light_propagation_volumes.geometry import passing, room_grid, surfaces
 from gibench.baselines.light_propagation_volumes.volume import AXES, EVEN, Grid, looked_up, propagated
 from gibench.baselines.linearly_transformed_cosines.implementation import RectangleLight, area_light
 from gibench.baselines.linearly_transformed_cosines.rectangle import light_arrays
@@ -135,7 +135,7 @@ class PropagatedLight:
 
 
 def _made(scene: Scene, cells: int, folder: Path) -> None:
-    grid = Grid.around(*room_box(scene), cells)
+    grid = room_grid(scene, cells)
     np.save(folder / PASSING, passing(grid, *surfaces(scene, grid)))
     (folder / GRID).write_text(json.dumps(asdict(grid)), encoding="utf-8")
 

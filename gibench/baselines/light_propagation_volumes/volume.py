@@ -53,13 +53,31 @@ class Grid:
     counts: tuple[int, int, int]
 
     @staticmethod
-    def around(low: NDArray[Any], high: NDArray[Any], cells: int) -> Grid:
-        """The grid that fills a box with that many cells along its longest side."""
+    def around(
+        low: NDArray[Any],
+        high: NDArray[Any],
+        cells: int,
+        least: NDArray[Any] | None = None,
+        most: NDArray[Any] | None = None,
+    ) -> Grid:
+        """The grid over a box with `cells` along its longest side, or up to an eighth fewer.
+
+        Of these numbers, the one by whose cells the other two sides are divided best, since what lies between faces is
+        blocked too early or too late. least, most: another box, whose parts outside of the first get cells as well.
+        """
+        low = np.asarray(low, dtype=float)
         extent = np.maximum(np.asarray(high, dtype=float) - low, 1e-3)
-        side = float(extent.max()) / cells
-        counts = np.maximum(np.ceil(extent / side - 1e-6), 1).astype(int)
-        middle = 0.5 * (np.asarray(low, dtype=float) + high)
-        corner = middle - 0.5 * side * counts
+        numbers = np.arange(cells, cells - cells // 8 - 1, -1)
+        parts = extent / extent.max() * numbers[:, None]
+        misfit = np.abs(parts - np.maximum(np.rint(parts), 1)).max(axis=1)
+        chosen = int(np.argmin(np.round(misfit, 3)))
+        side = float(extent.max()) / int(numbers[chosen])
+        counts = np.maximum(np.rint(parts[chosen]), 1).astype(int)
+        corner = 0.5 * (low + low + extent) - 0.5 * side * counts
+        end = corner + side * counts
+        before = np.maximum(np.rint((corner - (corner if least is None else least)) / side), 0).astype(int)
+        after = np.maximum(np.rint(((end if most is None else most) - end) / side), 0).astype(int)
+        corner, counts = corner - side * before, counts + before + after
         return Grid(tuple(corner.tolist()), side, tuple(counts.tolist()))
 
     @property

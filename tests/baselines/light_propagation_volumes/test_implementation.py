@@ -11,7 +11,7 @@ import pytest
 
 from gibench.baselines.light_propagation_volumes import METHOD
 from gibench.baselines.light_propagation_volumes.emission import lattice, lit_volume
-from gibench.baselines.light_propagation_volumes.geometry import passing, surfaces
+from gibench.baselines.light_propagation_volumes.geometry import passing, room_grid, surfaces, walls
 from gibench.baselines.light_propagation_volumes.implementation import PropagatedLight, spread
 from gibench.baselines.light_propagation_volumes.volume import Grid
 from gibench.baselines.linearly_transformed_cosines.rectangle import light_arrays
@@ -55,13 +55,17 @@ def frame(rig, method, light, resolution=RESOLUTION, camera=CAMERA):
 WHITE = 0.6
 
 
-def closed_room(**more):
-    """Two metres wide, around the origin."""
+def closed_room(middle=(0.0, 0.0, 0.0), half=(1.0, 1.0, 1.0), **more):
+    """Two metres wide, around the origin, where not said otherwise."""
     wall = scenes.two_sided(type="diffuse", reflectance=scenes.rgb(WHITE))
     for axis in range(3):
         for side in (-1, 1):
-            centre = [float(side) if a == axis else 0.0 for a in range(3)]
-            more[f"wall{axis}{side > 0}"] = scenes.rectangle(centre, [-c for c in centre], (1, 1), bsdf=wall)
+            towards = side * np.eye(3)[axis]
+            # Whichever of its sides lies along which axis, it reaches behind the walls beside it.
+            size = max(h for a, h in enumerate(half) if a != axis)
+            more[f"wall{axis}{side > 0}"] = scenes.rectangle(
+                (np.array(middle) + half * towards).tolist(), (-towards).tolist(), (size, size), bsdf=wall
+            )
     return load_dict({"type": "scene", **more})
 
 
@@ -98,6 +102,58 @@ def test_indirect_light_of_a_closed_white_room_is_that_of_paths(white_room, whit
     method.adjust(METHOD.settings({**SETTINGS, "bounces": bounces}))
     blocked = frame(white_room, method, light, camera=INSIDE).indirect
     assert 0.9 * found.mean() < blocked.mean() < 1.01 * found.mean()
+
+
+@pytest.mark.parametrize("cells", [16, 32])
+def test_faces_of_cells_lie_on_the_walls_of_a_room(cells):
+    """Whatever its proportions, and behind a cupboard that covers a third of a wall."""
+    middle, half = np.array((0.13, -0.27, 1.4)), np.array((2.75, 3.1, 1.4))
+    cupboard = {
+        "type": "cube",
+        "to_world": mi.ScalarTransform4f().translate([2.7, -0.27, 1.0]).scale([0.3, 1, 1]),
+    }
+    grid = room_grid(closed_room(middle, half, cupboard=cupboard), cells)
+    assert cells - cells // 8 <= max(grid.counts) <= cells
+    low, high = (np.abs((middle + side * half - grid.low) / grid.side) for side in (-1, 1))
+    np.testing.assert_allclose(low, 0, atol=0.15)
+    np.testing.assert_allclose(high, grid.counts, atol=0.15)
+
+
+def test_light_of_a_room_with_odd_proportions_is_that_of_paths(tmp_path):
+    """With surfaces that block light: those of the walls are in nobody's way."""
+    middle, shift = np.array((0.13, -0.27, 1.4)), np.array((0.3, 0.2, 0.7))
+    rig = LightRig(closed_room(middle, (2.75, 3.1, 1.4)), panoramas=False)
+    light = AreaLight(tuple((middle + shift).tolist()), (0.2, 0.1, -1), 0.5, 0.5, (5, 4, 3))
+    rig.set(Lighting(area=light))
+    camera = PinholeCamera(tuple((middle - (2.2, 2.5, 0)).tolist()), tuple(middle.tolist()), np.radians(80.0))
+    truth = render_frame(
+        rig.scene, camera, resolution=RESOLUTION, channels=("indirect_diffuse",), spp=64, max_depth=5
+    ).arrays["indirect_diffuse"]
+    found = [
+        frame(rig, prepared(rig, tmp_path, **options), light, camera=camera).indirect.mean(axis=(0, 1))
+        for options in (
+            {"geometry": geometry, "cells": 16, "bounces": 4, "steps": 64} for geometry in (True, False)
+        )
+    ]
+    np.testing.assert_allclose(found[0], truth.mean(axis=(0, 1)), rtol=0.12)
+    np.testing.assert_allclose(found[0], found[1], rtol=0.02)
+
+
+def test_walls_are_where_most_surface_faces_the_room():
+    """A niche behind one, a board before it, and a side that is open, as towards a garden."""
+    low, high = np.array((0.0, 0.0, 0.0)), np.array((4.0, 3.0, 2.5))
+    pieces = [
+        (4.1, (-1, 0, 0), 7.0),  # the wall, a little behind what free space has reached
+        (4.3, (-1, 0, 0), 1.0),  # the back of the niche
+        (3.9, (-1, 0, 0), 2.0),  # the board
+        (0.1, (-1, 0, 0), 9.0),  # the back of a screen
+    ]
+    points, normals, areas = zip(*(((x, 1.5, 1.0), normal, area) for x, normal, area in pieces), strict=True)
+    found = walls(low, high, *(np.array(part, dtype=float) for part in (points, normals, areas)))
+    np.testing.assert_allclose(found[0], low)
+    np.testing.assert_allclose(found[1], (4.1, 3.0, 2.5))
+    nothing = np.zeros((0, 3))
+    np.testing.assert_allclose(walls(low, high, nothing, nothing, np.zeros(0)), (low, high))
 
 
 def test_virtual_lights_hold_the_light_that_the_room_reflects(white_room):
