@@ -2,16 +2,36 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import typer
 
+from gibench import __version__
 from gibench.cli import bench, convert, dataset, doctor, environments, exporting, gallery, noise, stress
 
 app = typer.Typer(
     name="gibench",
-    help="Datasets for, and an honest comparison of, real-time global illumination.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
+
+
+def _say_version(asked: bool) -> None:
+    if asked:
+        typer.echo(__version__)
+        raise typer.Exit
+
+
+@app.callback()
+def main(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_say_version, is_eager=True, help="Say the version and exit."),
+    ] = False,
+) -> None:
+    """Datasets for, and an honest comparison of, real-time global illumination."""
+
+
 dataset.app.command("export")(exporting.export)
 app.add_typer(dataset.app, name="dataset")
 app.add_typer(bench.app, name="bench")

@@ -6,6 +6,7 @@ import sys
 import pytest
 from PIL import Image
 
+from gibench import __version__
 from gibench.cli import dataset as commands
 from gibench.cli import doctor, progress, run
 from gibench.cli.app import app, make_app
@@ -31,6 +32,11 @@ def test_help_loads_nothing_heavy():
     assert done.stdout.splitlines()[-1] == "loaded:"
     assert "--rooms" in done.stdout
     assert "--dry-run" in done.stdout
+
+
+def test_version(capsys):
+    assert run(app, ["--version"]) == 0
+    assert capsys.readouterr().out.strip() == __version__
 
 
 def test_verify_says_that_all_is_well_or_names_every_broken_file(made, capsys, tmp_path):
