@@ -9,7 +9,7 @@ from __future__ import annotations
 import difflib
 import importlib
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -239,21 +239,27 @@ class Prediction:
         self,
         color: Any,
         specular: Any = None,
-        extra: Mapping[str, float] | None = None,
+        extra: Mapping[str, float] | Callable[[], Mapping[str, float]] | None = None,
         *,
         indirect: Any = None,
     ) -> None:
         """color: all of the light. specular: what the first hit reflects by its specular lobe, direct and indirect.
 
         indirect: what comes to the first hit from other surfaces, by both lobes. None where the method cannot tell a
-        part apart. extra: numbers worth a column, such as the samples that were spent.
+        part apart. extra: numbers worth a column, such as the samples that were spent; or a function that works them
+        out, which is called like images are copied, once the clock has stopped.
         """
         self._images = {"color": color, "specular": specular, "indirect": indirect}
-        self.extra = dict(extra or {})
+        self._extra = extra or {}
 
     def finish(self) -> None:
         """Have the device compute what of the images it has put off. Part of a frame's time."""
         evaluate([image for image in self._images.values() if image is not None])
+
+    @cached_property
+    def extra(self) -> dict[str, float]:
+        """Numbers worth a column."""
+        return dict(self._extra() if callable(self._extra) else self._extra)
 
     @cached_property
     def color(self) -> NDArray[Any]:

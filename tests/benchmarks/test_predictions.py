@@ -101,3 +101,14 @@ def test_images_of_any_library_are_taken():
     assert parts.keys() == {"full", "specular", "indirect"}
     np.testing.assert_array_equal(parts["full"], numbers)
     np.testing.assert_array_equal(parts["specular"], 2 * numbers)
+
+
+def test_numbers_of_a_frame_are_worked_out_when_they_are_read():
+    calls = []
+    prediction = Prediction(good(), extra=lambda: calls.append(1) or {"samples": 3.0})
+    prediction.finish()
+    checked(prediction, (7, 5))
+    assert not calls
+    assert prediction.extra == prediction.extra == {"samples": 3.0}
+    assert len(calls) == 1
+    assert Prediction(good()).extra == {}

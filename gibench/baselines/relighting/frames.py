@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, ClassVar
 
@@ -53,7 +53,10 @@ class Relit(DirectLight):
         """What the light of all surfaces is made from, once a frame."""
 
     def numbers(self, view: View, light: Light, told: Any) -> dict[str, float]:
-        """What is worth a column of the light of a frame, and of what was told of it. Asked for once a frame."""
+        """What is worth a column of the light of a frame, and of what was told of it.
+
+        Asked for once a frame, in their order, after the clock has stopped.
+        """
         return {}
 
     @abstractmethod
@@ -85,15 +88,17 @@ class Relit(DirectLight):
             if self._last is None or self._last[0] != environment:
                 self._last = environment, self.light_of(environment)
             told = self.told(self._last[1])
-            extra = self.numbers(view, self._last[1], told)
         with stages.stage(self.stage), torch.inference_mode():
             signed = self.signed(images, view, told)
             indirect = signed.clamp(min=0)
-            extra["negative_indirect"] = negative_share(signed)
+        extra = partial(self._numbers, view, self._last[1], told, signed)
         with stages.stage("denoising"):
             return self._finished(
                 np.asarray(direct), indirect, [np.asarray(guide) for guide in guides], extra
             )
+
+    def _numbers(self, view: View, light: Light, told: Any, signed: Tensor) -> dict[str, float]:
+        return {**self.numbers(view, light, told), "negative_indirect": negative_share(signed)}
 
     def signed(self, images: Images, view: View, told: Any) -> Tensor:
         """Indirect radiance (H, W, 3) on the device, before what is negative is cut off; 0 where no surface is seen."""
@@ -109,7 +114,7 @@ class Relit(DirectLight):
         direct: NDArray[Any],
         indirect: Tensor,
         guides: Sequence[NDArray[Any]],
-        extra: Mapping[str, float],
+        extra: Callable[[], Mapping[str, float]],
     ) -> Prediction:
         """Denoise direct light, or all of the light and, where it is scored, indirect light once more."""
         made = indirect.cpu().numpy()
