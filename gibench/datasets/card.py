@@ -155,11 +155,19 @@ def _brightness(rows: pd.DataFrame) -> list[tuple[str, str]]:
 
 def _lamps(rooms: Collection[Mapping[str, Any]]) -> list[tuple[str, str]]:
     lines = []
-    lamps = [lamp for room in rooms for lamp in room.get("lights", ())]
-    lumens = [lamp["lumens"] for lamp in lamps if lamp.get("lumens") is not None]
-    kelvins = [lamp["kelvin"] for lamp in lamps if lamp.get("kelvin") is not None]
-    if lamps:
-        lines.append(("lamps of a room", _range([len(room.get("lights", ())) for room in rooms])))
+    counts, lumens, kelvins = [], [], []
+    for room in rooms:
+        # A shade glows, and so do its open ends: the lights of one lamp are named after it.
+        lamps: dict[str, float] = {}
+        for number, light in enumerate(room.get("lights", ())):
+            lamp = light.get("name", "").rpartition(".")[0] or str(number)
+            lamps[lamp] = lamps.get(lamp, 0.0) + (light.get("lumens") or 0.0)
+            if light.get("kelvin") is not None:
+                kelvins.append(light["kelvin"])
+        counts.append(len(lamps))
+        lumens += [flux for flux in lamps.values() if flux]
+    if any(counts):
+        lines.append(("lamps of a room", _range(counts)))
     if lumens:
         lines.append(("of a lamp", f"{_range(lumens)} lm" + (f", {_range(kelvins)} K" if kelvins else "")))
     outside = Counter(room["environment"]["kind"] for room in rooms if room.get("environment"))

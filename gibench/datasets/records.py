@@ -179,8 +179,9 @@ class Polished(Checked):
 
 
 class Lamp(Checked):
-    """A light of a room; those of scene files say neither."""
+    """A light of a room; those of scene files say neither flux nor temperature."""
 
+    name: str = ""
     lumens: float | None = None
     kelvin: float | None = None
 

@@ -40,8 +40,9 @@ def sample_ceiling_panel(rng: np.random.Generator, **fixed: Any) -> Furniture:
 def downlight(*, radius: float, height: float, lumens: float, kelvin: float) -> Furniture:
     """A small round light with a rim of 8 mm; `radius` is that of what glows, the ceiling is at z = 0 (m)."""
     outer, lip = radius + 0.008, 0.003
-    glow = -height + 0.008
-    profile = [[0.0, glow], [radius, glow], [radius, -height + lip], [radius + lip, -height]]
+    # Behind a deeper rim, a few paths by way of its metal would hold much of the light.
+    glow = -height + lip
+    profile = [[0.0, glow], [radius, glow], [radius + lip, -height]]
     profile += [[outer - lip, -height], [outer, -height + lip], [outer, 0.0], [0.0, 0.0]]
     light = Light("disk", "disk", (radius - 0.002,), (0.0, 0.0, glow - 0.002), DOWN, lumens, kelvin)
     parameters = {"radius": radius, "height": height, "lumens": lumens, "kelvin": kelvin}

@@ -68,10 +68,12 @@ def _black_body(kelvin: float) -> tuple[float, float, float]:
 
 
 def emitting_area(light: Light) -> float:
-    """Area that emits, m²: one side of a rectangle or disk, all of a sphere. Raises BadLight."""
-    count = {"rectangle": 2, "disk": 1, "sphere": 1}.get(light.shape)
+    """Area that emits, m²: one side of a rectangle or disk, the outside of a sphere or shade. Raises BadLight."""
+    count = {"rectangle": 2, "disk": 1, "sphere": 1, "shade": 3}.get(light.shape)
     if count is None:
-        raise BadLight(f"light {light.name!r} has the shape {light.shape!r}; use rectangle, disk or sphere")
+        raise BadLight(
+            f"light {light.name!r} has the shape {light.shape!r}; use rectangle, disk, sphere or shade"
+        )
     if len(light.size) != count or not all(math.isfinite(s) and s > 0 for s in light.size):
         raise BadLight(
             f"light {light.name!r} has the size {tuple(light.size)}; "
@@ -79,6 +81,9 @@ def emitting_area(light: Light) -> float:
         )
     if light.shape == "rectangle":
         return light.size[0] * light.size[1]
+    if light.shape == "shade":
+        lower, upper, height = light.size
+        return math.pi * (lower + upper) * math.hypot(lower - upper, height)
     return (4 if light.shape == "sphere" else 1) * math.pi * light.size[0] ** 2
 
 

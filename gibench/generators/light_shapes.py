@@ -12,6 +12,9 @@ from gibench.generators.parts import FloatArray, Light, Mesh
 from gibench.generators.poses import stand, turn
 from gibench.generators.shapes import sphere
 
+SHADE_SEGMENTS = 40
+"""Around a lamp shade."""
+
 LAMP_MATERIAL = "lamp"  # of the glass that glows; hardly ever seen to reflect
 
 
@@ -58,9 +61,11 @@ def light_matrix(light: Light) -> FloatArray:
 
 
 def light_mesh(light: Light, segments: int = 24) -> Mesh:
-    """The glowing surface as a mesh: open for a rectangle or disk, closed for a sphere."""
+    """The glowing surface as a mesh: open for a rectangle, disk or shade, closed for a sphere."""
     if light.shape == "sphere":
         return stand(sphere(light.size[0]), light.centre, 0.0)
+    if light.shape == "shade":
+        return stand(frustum(*light.size[:3]), light.centre, 0.0)
     if light.shape == "rectangle":
         flat = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     else:
@@ -72,3 +77,21 @@ def light_mesh(light: Light, segments: int = 24) -> Mesh:
     fan = np.column_stack([np.zeros(count - 2), np.arange(1, count - 1), np.arange(2, count)])
     normals = np.tile(np.asarray(light.direction, dtype=np.float64), (count, 1))
     return Mesh(vertices[:, :3], fan.astype(np.int32), normals, flat * light.size[0])
+
+
+def frustum(lower: float, upper: float, height: float, *, segments: int = SHADE_SEGMENTS) -> Mesh:
+    """The wall of an upright frustum around the origin, metres, open below and above; UVs in metres along it."""
+    angle = np.arange(segments + 1) * (2 * math.pi / segments)
+    slant = math.hypot(lower - upper, height)
+    out = np.column_stack([np.cos(angle), np.sin(angle)])
+    rise, lean = height / slant, (lower - upper) / slant
+    rings, normals, uvs = [], [], []
+    for radius, z, v in ((lower, -height / 2, 0.0), (upper, height / 2, slant)):
+        rings.append(np.column_stack([radius * out, np.full(segments + 1, z)]))
+        normals.append(np.column_stack([rise * out, np.full(segments + 1, lean)]))
+        uvs.append(np.column_stack([0.5 * (lower + upper) * angle, np.full(segments + 1, v)]))
+    first = np.arange(segments)
+    below = np.column_stack([first, first + 1, first + segments + 2])
+    above = np.column_stack([first, first + segments + 2, first + segments + 1])
+    faces = np.concatenate([below, above]).astype(np.int32)
+    return Mesh(np.concatenate(rings), faces, np.concatenate(normals), np.concatenate(uvs))

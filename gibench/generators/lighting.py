@@ -21,8 +21,8 @@ ENOUGH_LAMPS = 3  # rooms with that many bulbs may do without ceiling lights
 def light_room(rng: np.random.Generator, plan: FloorPlan) -> None:
     """Hang ceiling lights where the plan leaves room, and set the flux of every lamp in it.
 
-    rng: the lane of lights. The lamps of the room add up to 1500 to 6000 lm, each bulb gives 450 to 1600 lm. Raises
-    RejectedRoom where no light can hang.
+    rng: the lane of lights. The bulbs of the room add up to 1500 to 6000 lm, each gives 450 to 1600 lm, of which its
+    shade keeps some. Raises RejectedRoom where no light can hang.
     """
     footprint = plan.shell.footprint
     x, y = footprint[:, 0], footprint[:, 1]
@@ -30,7 +30,7 @@ def light_room(rng: np.random.Generator, plan: FloorPlan) -> None:
     target = sample_room_flux(rng, area)
     lamp_tone, ceiling_tone = sample_kelvin(rng), sample_kelvin(rng)
     lamps = [p for p in plan.placed if p.furniture.lights]
-    bulbs = sum(len(p.furniture.lights) for p in lamps)
+    bulbs = len(lamps)
     wants_none = rng.random() < 0.3 and bulbs >= ENOUGH_LAMPS
     fixtures = [] if wants_none else _fixtures(rng, plan)
     if bulbs + len(fixtures) == 0:
@@ -45,10 +45,7 @@ def light_room(rng: np.random.Generator, plan: FloorPlan) -> None:
         fluxes = _fit(fluxes, budget)
     if not fixtures and fluxes.sum() < ROOM_LUMENS[0]:
         raise RejectedRoom("too few lamps")
-    left = iter(fluxes.tolist())
-    for lamp in lamps:
-        # The bulbs of one lamp are alike.
-        own = float(np.mean([next(left) for _ in lamp.furniture.lights]))
+    for lamp, own in zip(lamps, fluxes.tolist(), strict=True):
         _set(plan, lamp, round(own, 1), lamp_tone)
     each = (target - float(fluxes.sum())) / max(1, len(fixtures))
     for fixture in fixtures:
@@ -70,7 +67,9 @@ def _fit(fluxes: np.ndarray, total: float) -> np.ndarray:
 
 
 def _set(plan: FloorPlan, lamp: Placed, lumens: float, kelvin: float) -> None:
-    lights = tuple(replace(light, lumens=lumens, kelvin=kelvin) for light in lamp.furniture.lights)
+    lights = tuple(
+        replace(light, lumens=light.share * lumens, kelvin=kelvin) for light in lamp.furniture.lights
+    )
     parameters = {**lamp.furniture.parameters, "lumens": lumens, "kelvin": kelvin}
     plan.replace_furniture(lamp, replace(lamp.furniture, lights=lights, parameters=parameters))
 

@@ -68,11 +68,14 @@ class Support:
 
 @dataclass(frozen=True)
 class Light:
-    """An emitter with a simple analytic shape, specified as people buy it.
+    """An emitter with a simple shape, specified as people buy it.
 
-    shape: "rectangle" (size = (width, height)), "disk" (size = (radius,)) or "sphere" (size = (radius,)), metres.
-    A rectangle or disk emits from its front side only, towards `direction` (unit); a sphere emits outward and
-    ignores it. centre: (3,) m. lumens: luminous flux of the whole emitter. kelvin: correlated colour temperature.
+    shape: "rectangle" (size = (width, height)), "disk" (size = (radius,)), "sphere" (size = (radius,)) or "shade" (size
+    = (radius below, radius above, height)), metres. A rectangle or disk emits from its front side only, towards
+    `direction` (unit); a sphere emits outward and ignores it, and so does a shade, the wall of an upright frustum that
+    is open below and above. centre: (3,) m. lumens: luminous flux of the whole emitter. kelvin: correlated colour
+    temperature. share: of a bulb's flux that this emitter gives off. slot: the material that glows, in a room its name;
+    empty for glass.
     """
 
     name: str
@@ -82,6 +85,8 @@ class Light:
     direction: tuple[float, float, float]
     lumens: float
     kelvin: float
+    share: float = 1.0
+    slot: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,8 +95,8 @@ class Furniture:
     the front towards +y, the back at −y, its length along x.
 
     family: the registry name ("chair"). parameters: what it was built from, JSON-able. lights: emitters that
-    belong to it, in its frame. hung: it is fixed to a wall (back plane at y = −depth/2, z = 0 at its lowest
-    point) or, for `mount="ceiling"`, its highest point touches z = 0 and it extends below.
+    belong to it, in its frame, all fed by one bulb. hung: it is fixed to a wall (back plane at y = −depth/2, z = 0 at
+    its lowest point) or, for `mount="ceiling"`, its highest point touches z = 0 and it extends below.
     mount: "floor", "wall", "ceiling" or "surface" (small things that stand on a Support).
     """
 

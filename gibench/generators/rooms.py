@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -29,7 +30,7 @@ from gibench.generators.lighting import light_room
 from gibench.generators.materials import is_glossy
 from gibench.generators.outside import GROUND, ground_material
 from gibench.generators.palette import Palette
-from gibench.generators.parts import Environment, FloatArray, Mesh, Part, Room, RoomObject
+from gibench.generators.parts import Environment, FloatArray, Light, Mesh, Part, Room, RoomObject
 from gibench.generators.poses import stand
 from gibench.generators.shapes import merge
 from gibench.generators.shell_sampling import sample_shell
@@ -210,9 +211,7 @@ def _try_room(
         if shine["gloss"] < MUCH:
             raise RejectedRoom("little gloss")
 
-    lights = tuple(
-        placed_light(light, p.name, p.position, p.yaw) for p in plan.placed for light in p.furniture.lights
-    )
+    lights = tuple(_light(light, p, palette) for p in plan.placed for light in p.furniture.lights)
     if isinstance(environment, str):
         kind_outside, panorama = (
             (environment, None) if environment in ("none", "sunsky") else ("hdr", environment)
@@ -317,6 +316,14 @@ def _objects(plan: FloorPlan, palette: Palette) -> tuple[RoomObject, ...]:
         parameters = thing.furniture.parameters
         objects.append(RoomObject(thing.name, family, parameters, thing.position, thing.yaw, shapes))
     return tuple(objects)
+
+
+def _light(light: Light, lamp: Placed, palette: Palette) -> Light:
+    """A lamp's light in the world, its slot filled."""
+    placed = placed_light(light, lamp.name, lamp.position, lamp.yaw)
+    if not light.slot:
+        return placed
+    return replace(placed, slot=palette.name_of(lamp.name, lamp.furniture.family, light.slot, ""))
 
 
 def _shapes(

@@ -18,7 +18,7 @@ from PIL import Image
 
 from gibench.generators.glb import write_glb
 from gibench.generators.light import radiance_of
-from gibench.generators.light_shapes import LAMP_MATERIAL, light_matrix
+from gibench.generators.light_shapes import LAMP_MATERIAL, light_matrix, light_mesh
 from gibench.generators.materials import bsdf_xml, tile_size
 from gibench.generators.outside import GROUND, ground_element
 from gibench.generators.panorama import write_panorama
@@ -50,6 +50,10 @@ def write_room(
         for number, (mesh, material) in enumerate(thing.shapes):
             tile = tile_size(room.materials[material])
             write_ply(mesh, folder / "meshes" / f"{thing.name}.{number}.ply", tile=tile)
+    for light in room.lights:
+        if light.shape == "shade":
+            tile = tile_size(room.materials[light.slot])
+            write_ply(light_mesh(light), folder / "meshes" / f"{light.name}.ply", tile=tile)
     for surface in room.materials.values():
         if isinstance(surface.reflectance, Texture):
             image = Image.fromarray(surface.reflectance.pixels)
@@ -174,9 +178,11 @@ def sensor_element(camera: Camera, name: str, resolution: tuple[int, int], spp: 
 
 
 def light_element(light: Light) -> Element:
-    """The `<shape>` of a lamp's light, which refers to the material LAMP_MATERIAL."""
-    shape = Element("shape", type=light.shape, id=light.name)
-    if light.shape == "sphere":
+    """The `<shape>` of a lamp's light, of the material LAMP_MATERIAL where it has no other."""
+    shape = Element("shape", type="ply" if light.shape == "shade" else light.shape, id=light.name)
+    if light.shape == "shade":
+        SubElement(shape, "string", name="filename", value=f"meshes/{light.name}.ply")
+    elif light.shape == "sphere":
         x, y, z = (_number(c) for c in light.centre)
         SubElement(shape, "point", name="center", x=x, y=y, z=z)
         SubElement(shape, "float", name="radius", value=_number(light.size[0]))
@@ -184,7 +190,7 @@ def light_element(light: Light) -> Element:
         transform = SubElement(shape, "transform", name="to_world")
         values = " ".join(_number(v) for v in light_matrix(light).ravel())
         SubElement(transform, "matrix", value=values)
-    SubElement(shape, "ref", id=LAMP_MATERIAL)
+    SubElement(shape, "ref", id=light.slot or LAMP_MATERIAL)
     emitter = SubElement(shape, "emitter", type="area")
     SubElement(emitter, "rgb", name="radiance", value=" ".join(_number(c) for c in radiance_of(light)))
     return shape

@@ -40,7 +40,7 @@ def spare_plugins() -> tuple[Any, ...]:
     spare: list[Any] = [mi.load_dict({"type": "twosided", "inside": kind}) for kind in kinds]
     plain = spare[0]
     lamp = {"bsdf": plain, "emitter": {"type": "area", "radiance": colors[0]}}
-    spare += [mi.load_dict({"type": name, **lamp}) for name in ("sphere", "disk", "rectangle")]
+    spare += [mi.load_dict({"type": name, **lamp}) for name in ("sphere", "disk", "rectangle", "cube")]
     panorama = mi.Bitmap(dr.full(mi.TensorXf, 0.5, (2, 4, 3)))
     spare.append(mi.load_dict({"type": "envmap", "bitmap": panorama}))
     fillers = (

@@ -45,14 +45,18 @@ def test_lamps_stand_in_it_where_they_are_known_and_lit(tmp_path):
     root, recipe = tmp_path / "d", tiny(1, channels=("color",))
     make(root, recipe, command="make-dataset", work=fake_work(root, recipe))
     described = {
-        "lights": [{"lumens": 450.0, "kelvin": 2700.0}, {"lumens": 1350.0, "kelvin": 4000.0}],
+        "lights": [
+            {"name": "table_lamp.0.shade", "lumens": 150.0, "kelvin": 2700.0},
+            {"name": "table_lamp.0.above", "lumens": 300.0, "kelvin": 2700.0},
+            {"name": "ceiling_panel.0.panel", "lumens": 1350.0, "kelvin": 4000.0},
+        ],
         "environment": {"kind": "sunsky"},
     }
     (root / "rooms/000000/room.json").write_text(json.dumps(described))
     dataset = open_dataset(root)
     text = card(root, dataset.manifest, dataset.frames)
     assert "| lamps of a room | 2 (2 to 2) |" in text
-    assert "| of a lamp | 900 (495 to 1305) lm, 3350 (2765 to 3935) K |" in text
+    assert "| of a lamp | 900 (495 to 1305) lm, 2700 (2700 to 3870) K |" in text
     assert "| outside the windows | sunsky 1 |" in text
     lit = dataset.frames.assign(lighting="area-light")
     manifest = {**dataset.manifest, "recipe": {**dataset.manifest["recipe"], "lighting": "area-light"}}

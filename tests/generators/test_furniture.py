@@ -6,8 +6,11 @@ import pytest
 
 from gibench.generators.furniture import FAMILIES, FurnitureError, build_furniture, sample_furniture
 from gibench.generators.furniture.drawing import draw
+from gibench.generators.light import LUMENS_PER_WATT, radiance_of
+from gibench.generators.light_shapes import light_mesh
 from gibench.generators.materials import SLOTS
 from gibench.generators.parts import Furniture
+from gibench.rendering.backend import select_variant
 from tests.generators.mesh_checks import area, assert_sound, pieces, uv_areas
 
 SIZED = ("width", "depth", "height")
@@ -118,18 +121,72 @@ def height_under(triangles: np.ndarray, x: float, y: float, limit: float) -> flo
     return float(np.max(heights[heights <= limit], initial=-np.inf))
 
 
-def test_lights_are_clear_of_every_mesh(built):
+def test_lights_are_those_of_one_bulb_and_lie_within_their_lamp(built):
     for piece in built:
+        low, high = piece.bounds()
         for light in piece.lights:
-            assert light.shape == "sphere"
-            assert 450 <= light.lumens <= 1600
+            assert light.lumens == light.share * piece.parameters["lumens"]
             assert 2700 <= light.kelvin <= 6500
-            assert 0.03 <= light.size[0] <= 0.06
-            low, high = piece.bounds()
-            assert np.all(np.array(light.centre) - light.size[0] >= low - 1e-9)
-            assert np.all(np.array(light.centre) + light.size[0] <= high + 1e-9)
-            triangles = np.concatenate([p.mesh.vertices[p.mesh.faces] for p in piece.parts])
-            assert distance_to(triangles, np.array(light.centre)) > light.size[0] + 1e-3
+            assert light.slot in ("", "lampshade")
+            glows = light_mesh(light).vertices
+            assert np.all(glows >= low - 1e-3)
+            assert np.all(glows <= high + 1e-3)
+            if light.shape == "sphere":
+                triangles = np.concatenate([p.mesh.vertices[p.mesh.faces] for p in piece.parts])
+                assert distance_to(triangles, np.array(light.centre)) > light.size[0] + 1e-3
+        if piece.lights:
+            assert 0.3 < sum(light.share for light in piece.lights) <= 1
+            assert 450 <= piece.parameters["lumens"] <= 1600
+
+
+def test_what_a_lamp_gives_off_is_seen_from_around_it(built):
+    """A little falls on its rim, its stem and its foot, and none goes through its shade from within."""
+    for piece in built[:4]:
+        if piece.lights:
+            given = sum(light.lumens for light in piece.lights)
+            assert 0.87 * given < flux_around(piece) < 1.003 * given
+
+
+def flux_around(piece, count: int = 1 << 18) -> float:
+    """Lumens that a sphere around a lamp sees glow, without what anything reflects."""
+    select_variant("auto")
+    import mitsuba as mi
+
+    meshes = [(part.mesh, 0.0) for part in piece.parts]
+    meshes += [
+        (light_mesh(light), radiance_of(light) @ np.array([0.2126, 0.7152, 0.0722])) for light in piece.lights
+    ]
+    scene = mi.load_dict(
+        {"type": "scene"}
+        | {f"part{number}": as_shape(mesh, float(level)) for number, (mesh, level) in enumerate(meshes)}
+    )
+    middle = piece.bounds().mean(axis=0)
+    radius = 1.01 * np.linalg.norm(piece.bounds()[1] - middle)
+    rng = np.random.default_rng(0)
+    outward = rng.standard_normal((3, count))
+    outward /= np.linalg.norm(outward, axis=0)
+    inward = rng.standard_normal((3, count))
+    inward = inward / np.linalg.norm(inward, axis=0) - outward
+    inward /= np.linalg.norm(inward, axis=0)
+    origin = (middle[:, None] + radius * outward).astype(np.float32)
+    hit = scene.ray_intersect(mi.Ray3f(mi.Point3f(origin), mi.Vector3f(inward.astype(np.float32))))
+    seen = np.array(hit.emitter(scene).eval(hit)[1])
+    return float(4 * np.pi * radius**2 * np.pi * seen.mean() * LUMENS_PER_WATT)
+
+
+def as_shape(mesh, level):
+    import mitsuba as mi
+
+    properties = mi.Properties()
+    if level:
+        emitter = mi.load_dict({"type": "area", "radiance": {"type": "rgb", "value": level}})
+        properties["emitter"] = emitter
+    shape = mi.Mesh("part", len(mesh.vertices), len(mesh.faces), props=properties)
+    parameters = mi.traverse(shape)
+    parameters["vertex_positions"] = mesh.vertices.astype(np.float32).ravel()
+    parameters["faces"] = mesh.faces.astype(np.uint32).ravel()
+    parameters.update()
+    return shape
 
 
 def distance_to(triangles: np.ndarray, point: np.ndarray) -> float:

@@ -8,7 +8,8 @@ import numpy as np
 
 from gibench.generators.furniture.drawing import Size, checked, draw
 from gibench.generators.furniture.joinery import centred
-from gibench.generators.furniture.lamps import BULB, bulb
+from gibench.generators.furniture.lamp_light import out_of_bowl, turned_area
+from gibench.generators.furniture.lamps import BULB, RECESS, fed, glow, within
 from gibench.generators.parts import Furniture, Part
 from gibench.generators.shapes import cylinder, merge, revolve, rod, rotate_y, translate
 
@@ -49,11 +50,10 @@ def desk_lamp(
     ]
     shade = revolve(np.array([*inside, *outside]), segments=32)
     meshes.append(translate(shade, [0, reach, 0]))
-    radius = 0.03
-    z = z1 - 0.62 * head_h
-    socket = cylinder(0.014, z + radius + 0.003, z1 - 0.005, segments=16, centre=(0, reach))
-    light = bulb((0.0, reach, float(z)), radius, lumens, kelvin)
-    placed, lights = centred([Part(merge([*meshes, socket]), finish)], [light])
+    share = out_of_bowl(head_r - wall, turned_area(np.array(inside)), 0.38 * head_h)
+    wide = within(head_r - wall - 0.02 * head_r)
+    light = glow("below", wide, (0.0, reach, float(z1 - head_h + RECESS)), False, share)
+    placed, lights = centred([Part(merge(meshes), finish)], fed([light], lumens, kelvin))
     return Furniture("desk_lamp", parameters, placed, (), lights, mount="surface")
 
 

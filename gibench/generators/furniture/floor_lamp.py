@@ -8,7 +8,7 @@ import numpy as np
 
 from gibench.generators.furniture.drawing import Size, checked, draw
 from gibench.generators.furniture.joinery import centred
-from gibench.generators.furniture.lamps import BULB, SHADES, shaded_bulb
+from gibench.generators.furniture.lamps import BULB, SHADES, fed, shaded_bulb
 from gibench.generators.parts import Furniture, Part
 from gibench.generators.shapes import bend, circle, cylinder, loft, merge, tube
 
@@ -37,14 +37,12 @@ def floor_lamp(
     """
     parameters = checked("floor_lamp", locals(), SIZES, CHOICES)
     reach, stem = 0.75, 0.012
-    parts, light, joint = shaded_bulb(
+    parts, lights, joint = shaded_bulb(
         shade_style,
         shade_width,
         height - 0.12 if style == "arc" else height,
         hanging=style == "arc",
         radius=_RADIUS,
-        lumens=lumens,
-        kelvin=kelvin,
         metal=metal,
         at=(0.0, reach) if style == "arc" else (0.0, 0.0),
     )
@@ -68,8 +66,8 @@ def floor_lamp(
         parts.append(Part(merge(sticks), "wood"))
         parts.append(Part(cylinder(0.036, hub, hub + 0.05, bevel=0.004), metal))
         parts.append(Part(cylinder(0.009, hub + 0.03, joint + 0.004, segments=12), metal))
-    placed, lights = centred(parts, [light])
-    return Furniture("floor_lamp", parameters, placed, (), lights)
+    placed, moved = centred(parts, fed(lights, lumens, kelvin))
+    return Furniture("floor_lamp", parameters, placed, (), moved)
 
 
 def sample_floor_lamp(rng: np.random.Generator, **fixed: Any) -> Furniture:

@@ -8,7 +8,8 @@ import numpy as np
 
 from gibench.generators.furniture.drawing import Size, checked, draw
 from gibench.generators.furniture.joinery import EMBED
-from gibench.generators.furniture.lamps import BULB, SHADES, bulb, shaded_bulb
+from gibench.generators.furniture.lamp_light import out_of_bowl, turned_area
+from gibench.generators.furniture.lamps import BULB, RECESS, SHADES, bulb, fed, glow, shaded_bulb, within
 from gibench.generators.parts import Furniture, Part
 from gibench.generators.shapes import (
     bezier,
@@ -39,16 +40,7 @@ def pendant(
     rose = cylinder(0.05, -0.028, 0.0, top_radius=0.055, bevel=0.003)
     if style in SHADES:
         top = -height + SHADES[style][1] * shade_width
-        parts, light, joint = shaded_bulb(
-            style,
-            shade_width,
-            top,
-            hanging=True,
-            radius=0.04,
-            lumens=lumens,
-            kelvin=kelvin,
-            metal=metal,
-        )
+        parts, lights, joint = shaded_bulb(style, shade_width, top, hanging=True, radius=0.04, metal=metal)
     elif style == "dome":
         r, tall = shade_width / 2, 0.55 * shade_width
         turn = np.linspace(0, 0.96 * np.pi / 2, 10)
@@ -59,15 +51,15 @@ def pendant(
         peak = -height + tall
         loop = np.concatenate([[[0, peak - 2 * thick]], inner, outer, [[0, peak]]])
         parts = [Part(revolve(loop, segments=40), metal)]
-        radius = 0.04
-        light = bulb((0.0, 0.0, -height + 0.35 * tall), radius, lumens, kelvin)
-        stem = (light.centre[2] + radius + 0.003, peak + 0.05)
+        share = out_of_bowl(r - thick, turned_area(inner), 0.35 * tall)
+        lights = [glow("below", within(0.999 * r - thick), (0.0, 0.0, -height + RECESS), False, share)]
+        stem = (peak - 0.05, peak + 0.05)
         parts.append(Part(cylinder(0.02, *stem, segments=16), metal))
         joint = peak + 0.05
     else:
         radius, tall = 0.045, min(0.8 * shade_width, height - 0.1)
         joint = -height + tall
-        light = bulb((0.0, 0.0, joint - 0.063 - radius), radius, lumens, kelvin)
+        lights = [bulb((0.0, 0.0, joint - 0.063 - radius), radius)]
         corners = [
             [0.02, 0, joint - 0.03],
             [0.3 * shade_width, 0, joint - 0.06],
@@ -85,7 +77,7 @@ def pendant(
         parts = [Part(merge([revolve(cap, segments=20), *wires]), metal)]
     parts.append(Part(rose, metal))
     parts.append(Part(cylinder(0.003, joint - 2 * EMBED, -0.02, bevel=0.0005, segments=8), "plastic"))
-    return Furniture("pendant", parameters, tuple(parts), (), (light,), mount="ceiling")
+    return Furniture("pendant", parameters, tuple(parts), (), fed(lights, lumens, kelvin), mount="ceiling")
 
 
 def sample_pendant(rng: np.random.Generator, **fixed: Any) -> Furniture:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from gibench.generators.furniture.drawing import Size, checked, draw
-from gibench.generators.furniture.lamps import BULB, SHADES, shaded_bulb
+from gibench.generators.furniture.lamps import BULB, SHADES, fed, shaded_bulb
 from gibench.generators.parts import Furniture, Part
 from gibench.generators.shapes import cylinder, fillet, revolve
 
@@ -37,14 +37,12 @@ def table_lamp(
     Raises FurnitureError for a size out of SIZES or an option out of CHOICES.
     """
     parameters = checked("table_lamp", locals(), SIZES, CHOICES)
-    parts, light, joint = shaded_bulb(
+    parts, lights, joint = shaded_bulb(
         shade_style,
         min(shade_width, 0.72 * height),
         height,
         hanging=False,
         radius=0.03,
-        lumens=lumens,
-        kelvin=kelvin,
         metal=metal,
     )
     neck = joint - 0.015
@@ -59,7 +57,7 @@ def table_lamp(
     soft = [0, 0.004, *[0.35 * r] * (len(line) - 2), 0.004, 0]
     parts.append(Part(revolve(fillet(points, soft, segments=5), segments=32), body))
     parts.append(Part(cylinder(0.008, neck - 0.004, joint + 0.004, segments=12), metal))
-    return Furniture("table_lamp", parameters, tuple(parts), (), (light,), mount="surface")
+    return Furniture("table_lamp", parameters, tuple(parts), (), fed(lights, lumens, kelvin), mount="surface")
 
 
 def sample_table_lamp(rng: np.random.Generator, **fixed: Any) -> Furniture:

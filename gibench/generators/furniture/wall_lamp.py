@@ -8,7 +8,8 @@ import numpy as np
 
 from gibench.generators.furniture.drawing import Size, checked, draw
 from gibench.generators.furniture.joinery import centred
-from gibench.generators.furniture.lamps import BULB, bulb, shaded_bulb
+from gibench.generators.furniture.lamp_light import out_of_bowl, turned_area
+from gibench.generators.furniture.lamps import BULB, fed, glow, shaded_bulb, within
 from gibench.generators.parts import Furniture, Part
 from gibench.generators.shapes import box, fillet, merge, revolve, rod, translate
 
@@ -28,16 +29,8 @@ def wall_lamp(
     gap = 0.045
     y = w  # of the shade, in a frame whose wall is at y = -gap
     if style == "shade":
-        parts, light, joint = shaded_bulb(
-            "empire",
-            width,
-            height,
-            hanging=False,
-            radius=0.03,
-            lumens=lumens,
-            kelvin=kelvin,
-            metal=metal,
-            at=(0.0, y),
+        parts, lights, joint = shaded_bulb(
+            "empire", width, height, hanging=False, radius=0.03, metal=metal, at=(0.0, y)
         )
         low = 0.0
         plate = box(-0.035, 0.035, -gap, -gap + 0.012, low, low + 0.12, bevel=0.004)
@@ -52,17 +45,19 @@ def wall_lamp(
         profile[:, 0] *= r / profile[:, 0].max()
         bowl = revolve(profile, segments=40)
         parts = [Part(translate(bowl, [0, y, 0]), metal)]
-        z = 0.62 * height
-        radius = 0.03
-        light = bulb((0.0, y, z), radius, lumens, kelvin)
+        # From the rim inside down to the axis; the rim itself is rounded.
+        hollow = profile[np.argmax(profile[:, 1]) :]
+        share = out_of_bowl(r - 0.003, turned_area(hollow), 0.38 * height)
+        shown = height - 0.004
+        wide = within(float(np.interp(shown, *hollow[::-1].T[::-1])))
+        lights = [glow("above", wide, (0.0, y, shown), True, share)]
         plate = box(-0.035, 0.035, -gap, -gap + 0.012, 0.25 * height, 0.25 * height + 0.1, bevel=0.004)
         bar = [
             rod([0, -gap + 0.01, 0.25 * height + 0.05], [0, 0.5 * y, 0.25 * height + 0.05], 0.008),
-            rod([0, y, 0.005], [0, y, z - radius - 0.003], 0.014),
         ]
     parts.append(Part(merge([plate, *bar]), metal))
-    moved, lights = centred(parts, [light])
-    return Furniture("wall_lamp", parameters, moved, (), lights, mount="wall")
+    moved, placed = centred(parts, fed(lights, lumens, kelvin))
+    return Furniture("wall_lamp", parameters, moved, (), placed, mount="wall")
 
 
 def sample_wall_lamp(rng: np.random.Generator, **fixed: Any) -> Furniture:
