@@ -14,6 +14,9 @@ from gibench.generators.furniture.lamp_light import (
     turned_area,
 )
 from gibench.generators.furniture.lamps import SHADES
+from gibench.generators.light import emitting_area
+from gibench.generators.light_shapes import light_mesh
+from gibench.generators.parts import Light
 
 
 def cosines_around(rng, normals):
@@ -87,3 +90,20 @@ def test_of_half_a_sphere_as_much_leaves_as_in_closed_form():
     assert out_of_bowl(1.0, area, 0.0) == pytest.approx(
         0.5 + 0.5 * POLISHED * 0.5 / (1 - 0.5 * POLISHED), rel=1e-4
     )
+
+
+@pytest.mark.parametrize("size", [(0.2, 0.1, 0.25), (0.15, 0.15, 0.2), (0.1, 0.2, 0.3)])
+def test_a_shade_glows_outwards_over_the_area_that_its_radiance_counts_on(size):
+    light = Light("a", "shade", size, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 1000.0, 3000.0)
+    mesh = light_mesh(light)
+    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
+    cross = np.cross(b - a, c - a) / 2
+    assert np.linalg.norm(cross, axis=1).sum() == pytest.approx(emitting_area(light), rel=0.002)
+    middle = (a + b + c) / 3
+    assert (np.einsum("ij,ij->i", cross[:, :2], middle[:, :2]) > 0).all()
+    along = np.einsum(
+        "ij,ij->i", mesh.normals[mesh.faces[:, 0]], cross / np.linalg.norm(cross, axis=1)[:, None]
+    )
+    assert (along > 0.99).all()
+    np.testing.assert_allclose(np.linalg.norm(mesh.normals, axis=1), 1)
+    np.testing.assert_allclose(mesh.vertices[:, 2].max(), size[2] / 2)

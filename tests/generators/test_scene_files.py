@@ -5,7 +5,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from gibench.generators.light import radiance_of
+from gibench.generators.light import LUMENS_PER_WATT, radiance_of
 from gibench.generators.light_shapes import TiltedLight, light_matrix, light_mesh, placed_light
 from gibench.generators.parts import Light, Texture
 from gibench.generators.scene_files import write_ply, write_room
@@ -69,6 +69,27 @@ def test_stock_mitsuba_renders_the_scene(folder):
     assert image.dtype == np.float32
     assert np.isfinite(image).all()
     assert (image.sum(2) > 0).mean() > 0.9
+
+
+def test_lights_that_are_loaded_emit_their_lumens(folder):
+    """Shape by shape: area, radiance and the colour that the eye sees, and shades of their cloth."""
+    select_variant()
+    import mitsuba as mi
+
+    scene = mi.load_file(str(folder / "scene.xml"))
+    shapes = {shape.id(): shape for shape in scene.shapes()}
+    kinds = {light.shape for light in room(0).lights}
+    assert "shade" in kinds
+    for light in room(0).lights:
+        shape = shapes[light.name]
+        radiance = np.array(mi.traverse(shape.emitter())["radiance.value"]).ravel()
+        flux = (
+            LUMENS_PER_WATT * math.pi * float(shape.surface_area()[0]) * radiance @ [0.2126, 0.7152, 0.0722]
+        )
+        assert flux == pytest.approx(light.lumens, rel=0.005)
+        if light.shape == "shade":
+            assert shape.bsdf().id() == light.slot
+            assert room(0).materials[light.slot].family == "fabric"
 
 
 def test_the_scene_says_what_was_asked(folder):

@@ -76,6 +76,55 @@ def measured(runs, repeats=REPEATS):
     return found
 
 
+def _with_bulbs(room):
+    """The room with bulbs in its cloth shades, which then do not glow; None where it has no such shade."""
+    lights, bulbs = [], {}
+    for light in room.lights:
+        if light.shape == "shade":
+            radius = 0.2 * min(light.size[:2])
+            bulbs[light.name.rpartition(".")[0]] = replace(
+                light, shape="sphere", size=(radius,), lumens=light.lumens / light.share, slot=""
+            )
+    for light in room.lights:
+        if light.name.rpartition(".")[0] not in bulbs:
+            lights.append(light)
+    return replace(room, lights=(*lights, *bulbs.values())) if bulbs else None
+
+
+def test_shades_that_glow_against_bulbs_in_them(tmp_path):
+    """By night. Bulbs stand in the middle of opaque shades, without sockets."""
+    from gibench.generators.rooms import sample_room
+    from gibench.generators.scene_files import write_room
+
+    rows = []
+    for index in range(ROOMS):
+        room = sample_room(1, index, views=1, environment="none")
+        other = _with_bulbs(room)
+        if other is None:
+            continue
+        camera = room.cameras[0].pinhole
+        runs = {}
+        for name, made in (("glow", room), ("bulbs", other)):
+            write_room(made, tmp_path / f"{index}-{name}")
+            scene = load_scene(tmp_path / f"{index}-{name}/scene.xml")
+            runs[name] = lambda seed, resolution, scene=scene, camera=camera: render_frame(
+                scene, camera, resolution=resolution, spp=SPP, seed=seed, channels=["color"]
+            ).arrays["color"]
+        # Each against its own mean: how bright the rooms are differs.
+        found = {name: measured({name: run})[name] for name, run in runs.items()}
+        ratios = [a / b for a, b in zip(found["glow"], found["bulbs"], strict=True)]
+        rows.append([ratios[0], ratios[1], ratios[0] * ratios[3]])
+        print(
+            f"\nroom {index}, {room.kind}: variance {found['glow'][0]:.3f} against {found['bulbs'][0]:.3f}: "
+            f"{ratios[0]:.2f} ({ratios[1]:.2f} trimmed), CPU s {ratios[3]:.2f}, variance x time {rows[-1][2]:.2f}"
+        )
+    means, largest = np.exp(np.log(rows).mean(axis=0)), np.max(rows, axis=0)
+    print(
+        f"\nof bulbs, geometric means over {len(rows)} rooms (largest): variance {means[0]:.2f} ({largest[0]:.2f}), "
+        f"trimmed {means[1]:.2f} ({largest[1]:.2f}), variance x time {means[2]:.2f} ({largest[2]:.2f})"
+    )
+
+
 def test_guided_and_plain_against_path(tmp_path):
     ratios = {}
     for index in range(ROOMS):
