@@ -8,6 +8,7 @@ import typer
 
 from gibench import __version__
 from gibench.cli import bench, convert, dataset, doctor, environments, exporting, gallery, noise, stress
+from gibench.cli.output import say
 
 app = typer.Typer(
     name="gibench",
@@ -18,7 +19,7 @@ app = typer.Typer(
 
 def _say_version(asked: bool) -> None:
     if asked:
-        typer.echo(__version__)
+        say(__version__)
         raise typer.Exit
 
 
