@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Iterable
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -101,6 +103,11 @@ def radiance_of(light: Light) -> tuple[float, float, float]:
     level = light.lumens / (LUMENS_PER_WATT * math.pi * emitting_area(light))
     red, green, blue = kelvin_to_rgb(light.kelvin)
     return level * red, level * green, level * blue
+
+
+def fed(lights: Iterable[Light], lumens: float, kelvin: float) -> tuple[Light, ...]:
+    """The lights of a lamp, with their shares of what its bulb gives (lm, K)."""
+    return tuple(replace(light, lumens=light.share * lumens, kelvin=kelvin) for light in lights)
 
 
 def sample_kelvin(rng: np.random.Generator) -> float:

@@ -10,7 +10,14 @@ import numpy as np
 from gibench.generators.fixtures import sample_ceiling_panel, sample_downlight
 from gibench.generators.layouts.placement import FloorPlan, Placed, RejectedRoom
 from gibench.generators.layouts.relations import from_ceiling
-from gibench.generators.light import BULB_LUMENS, ROOM_LUMENS, sample_bulb, sample_kelvin, sample_room_flux
+from gibench.generators.light import (
+    BULB_LUMENS,
+    ROOM_LUMENS,
+    fed,
+    sample_bulb,
+    sample_kelvin,
+    sample_room_flux,
+)
 
 FIXTURE_LUMENS = 450.0  # least flux of a ceiling light
 DOWNLIGHT_SPACING = 1.5  # m
@@ -67,9 +74,7 @@ def _fit(fluxes: np.ndarray, total: float) -> np.ndarray:
 
 
 def _set(plan: FloorPlan, lamp: Placed, lumens: float, kelvin: float) -> None:
-    lights = tuple(
-        replace(light, lumens=light.share * lumens, kelvin=kelvin) for light in lamp.furniture.lights
-    )
+    lights = fed(lamp.furniture.lights, lumens, kelvin)
     parameters = {**lamp.furniture.parameters, "lumens": lumens, "kelvin": kelvin}
     plan.replace_furniture(lamp, replace(lamp.furniture, lights=lights, parameters=parameters))
 

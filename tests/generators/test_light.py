@@ -16,8 +16,8 @@ from gibench.generators.light import (
 )
 from gibench.generators.parts import Light
 from gibench.rendering.backend import select_variant
+from tests.generators.flux import LUMINANCE, lumens_around
 
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 TONES = (2700.0, 3000.0, 3500.0, 4000.0, 5000.0, 6500.0)
 
 
@@ -49,17 +49,7 @@ def test_emitted_flux_integrates_back_to_the_lumens(shape, size):
             },
         }
     )
-    rng, count, radius = np.random.default_rng(0), 1 << 20, 1.0
-    # Positions uniform on the sphere, directions inward in proportion to the cosine: flux = 4πR² · π · mean radiance.
-    outward = rng.standard_normal((3, count))
-    outward /= np.linalg.norm(outward, axis=0)
-    inward = rng.standard_normal((3, count))
-    inward = inward / np.linalg.norm(inward, axis=0) - outward
-    inward /= np.linalg.norm(inward, axis=0)
-    ray = mi.Ray3f(mi.Point3f(outward.astype(np.float32) * radius), mi.Vector3f(inward.astype(np.float32)))
-    hit = scene.ray_intersect(ray)
-    emitted = np.array(hit.emitter(scene).eval(hit, hit.is_valid())).mean(1)
-    flux = 4 * math.pi * radius**2 * math.pi * 683 * (LUMINANCE @ emitted)
+    flux = lumens_around(scene, (0.0, 0.0, 0.0), 1.0, 1 << 20)
     assert flux == pytest.approx(1234, rel=0.02)
 
 

@@ -51,7 +51,7 @@ def room_grid(scene: Scene, cells: int) -> Grid:
         low, high = np.array(box.min, dtype=float).ravel(), np.array(box.max, dtype=float).ravel()
     more = NEAR * max(float((high - low).max()), 1e-3)
     around = Grid.around(low - more, high + more, cells)
-    return Grid.around(*walls(low, high, *surfaces(scene, around)), cells, low, high)
+    return Grid.around(*walls(low, high, *surfaces(scene, around)), cells).reaching(low, high)
 
 
 def walls(

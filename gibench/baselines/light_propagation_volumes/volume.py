@@ -53,17 +53,11 @@ class Grid:
     counts: tuple[int, int, int]
 
     @staticmethod
-    def around(
-        low: NDArray[Any],
-        high: NDArray[Any],
-        cells: int,
-        least: NDArray[Any] | None = None,
-        most: NDArray[Any] | None = None,
-    ) -> Grid:
+    def around(low: NDArray[Any], high: NDArray[Any], cells: int) -> Grid:
         """The grid over a box with `cells` along its longest side, or up to an eighth fewer.
 
         Of these numbers, the one by whose cells the other two sides are divided best, since what lies between faces is
-        blocked too early or too late. least, most: another box, whose parts outside of the first get cells as well.
+        blocked too early or too late.
         """
         low = np.asarray(low, dtype=float)
         extent = np.maximum(np.asarray(high, dtype=float) - low, 1e-3)
@@ -73,12 +67,16 @@ class Grid:
         chosen = int(np.argmin(np.round(misfit, 3)))
         side = float(extent.max()) / int(numbers[chosen])
         counts = np.maximum(np.rint(parts[chosen]), 1).astype(int)
-        corner = 0.5 * (low + low + extent) - 0.5 * side * counts
-        end = corner + side * counts
-        before = np.maximum(np.rint((corner - (corner if least is None else least)) / side), 0).astype(int)
-        after = np.maximum(np.rint(((end if most is None else most) - end) / side), 0).astype(int)
-        corner, counts = corner - side * before, counts + before + after
+        corner = low + 0.5 * (extent - side * counts)
         return Grid(tuple(corner.tolist()), side, tuple(counts.tolist()))
+
+    def reaching(self, low: NDArray[Any], high: NDArray[Any]) -> Grid:
+        """The grid with as many cells more on each side as the other box goes beyond it."""
+        corner, counts = np.array(self.low), np.array(self.counts)
+        before = np.maximum(np.rint((corner - low) / self.side), 0).astype(int)
+        after = np.maximum(np.rint((high - corner) / self.side - counts), 0).astype(int)
+        corner, counts = corner - self.side * before, counts + before + after
+        return Grid(tuple(corner.tolist()), self.side, tuple(counts.tolist()))
 
     @property
     def size(self) -> int:

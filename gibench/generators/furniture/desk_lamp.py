@@ -9,7 +9,8 @@ import numpy as np
 from gibench.generators.furniture.drawing import Size, checked, draw
 from gibench.generators.furniture.joinery import centred
 from gibench.generators.furniture.lamp_light import out_of_bowl, turned_area
-from gibench.generators.furniture.lamps import BULB, RECESS, fed, glow, within
+from gibench.generators.furniture.lamps import BULB, RECESS, glow, within
+from gibench.generators.light import fed
 from gibench.generators.parts import Furniture, Part
 from gibench.generators.shapes import cylinder, merge, revolve, rod, rotate_y, translate
 

@@ -8,7 +8,8 @@ import numpy as np
 
 from gibench.generators.furniture.drawing import Size, checked, draw
 from gibench.generators.furniture.joinery import centred
-from gibench.generators.furniture.lamps import BULB, SHADES, fed, shaded_bulb
+from gibench.generators.furniture.lamps import BULB, SHADES, shaded_bulb
+from gibench.generators.light import fed
 from gibench.generators.parts import Furniture, Part
 from gibench.generators.shapes import bend, circle, cylinder, loft, merge, tube
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -37,7 +35,7 @@ _SOCKET = 0.045
 
 
 def bulb(centre: tuple[float, float, float], radius: float) -> Light:
-    """A spherical bulb that is seen (m), for `fed`."""
+    """A spherical bulb that is seen (m), for `light.fed`."""
     return Light("bulb", "sphere", (radius,), centre, (0.0, 0.0, -1.0), 0.0, 0.0)
 
 
@@ -53,13 +51,8 @@ def within(radius: float) -> float:
 
 
 def glow(name: str, radius: float, centre: tuple[float, float, float], up: bool, share: float) -> Light:
-    """The open end of a shade (m), as bright as what leaves through it, a share of the bulb's flux; for `fed`."""
+    """The open end of a shade (m), as bright as what leaves through it, a share of the bulb's flux; for `light.fed`."""
     return Light(name, "disk", (radius,), centre, (0.0, 0.0, 1.0 if up else -1.0), 0.0, 0.0, share)
-
-
-def fed(lights: Sequence[Light], lumens: float, kelvin: float) -> tuple[Light, ...]:
-    """The lights of a lamp, with their shares of what its bulb gives (lm, K)."""
-    return tuple(replace(light, lumens=light.share * lumens, kelvin=kelvin) for light in lights)
 
 
 def shaded_bulb(
@@ -76,7 +69,8 @@ def shaded_bulb(
 
     style: of SHADES; width: across the shade's lower rim; z1: the upper rim. radius: of the bulb (m).
     hanging: the socket is above the bulb, otherwise below it. metal: slot of socket and shade holder.
-    Returns the parts, the lights, for `fed`, and the height of the far end of the socket, where the stem joins (m).
+    Returns the parts, the lights, for `light.fed`, and the height of the far end of the socket, where the stem joins
+    (m).
     """
     share, tallness = SHADES[style]
     lower = width / 2

@@ -9,7 +9,9 @@ import numpy as np
 from gibench.generators.furniture.drawing import Size, checked, draw
 from gibench.generators.furniture.joinery import EMBED
 from gibench.generators.furniture.lamp_light import out_of_bowl, turned_area
-from gibench.generators.furniture.lamps import BULB, RECESS, SHADES, bulb, fed, glow, shaded_bulb, within
+from gibench.generators.furniture.lamps import BULB, RECESS, SHADES, bulb, glow, shaded_bulb, within
+from gibench.generators.light import fed
+from gibench.generators.light_shapes import SHADE_SEGMENTS
 from gibench.generators.parts import Furniture, Part
 from gibench.generators.shapes import (
     bezier,
@@ -50,7 +52,7 @@ def pendant(
         inner[-1, 1] = -height
         peak = -height + tall
         loop = np.concatenate([[[0, peak - 2 * thick]], inner, outer, [[0, peak]]])
-        parts = [Part(revolve(loop, segments=40), metal)]
+        parts = [Part(revolve(loop, segments=SHADE_SEGMENTS), metal)]
         share = out_of_bowl(r - thick, turned_area(inner), 0.35 * tall)
         lights = [glow("below", within(0.999 * r - thick), (0.0, 0.0, -height + RECESS), False, share)]
         stem = (peak - 0.05, peak + 0.05)

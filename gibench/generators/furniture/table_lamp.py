@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from gibench.generators.furniture.drawing import Size, checked, draw
-from gibench.generators.furniture.lamps import BULB, SHADES, fed, shaded_bulb
+from gibench.generators.furniture.lamps import BULB, SHADES, shaded_bulb
+from gibench.generators.light import fed
 from gibench.generators.parts import Furniture, Part
 from gibench.generators.shapes import cylinder, fillet, revolve
 

@@ -9,7 +9,9 @@ import numpy as np
 from gibench.generators.furniture.drawing import Size, checked, draw
 from gibench.generators.furniture.joinery import centred
 from gibench.generators.furniture.lamp_light import out_of_bowl, turned_area
-from gibench.generators.furniture.lamps import BULB, fed, glow, shaded_bulb, within
+from gibench.generators.furniture.lamps import BULB, glow, shaded_bulb, within
+from gibench.generators.light import fed
+from gibench.generators.light_shapes import SHADE_SEGMENTS
 from gibench.generators.parts import Furniture, Part
 from gibench.generators.shapes import box, fillet, merge, revolve, rod, translate
 
@@ -43,7 +45,7 @@ def wall_lamp(
         line = [[0, 0.0], [0.35 * r, 0.0], [r, height], [r - 0.003, height], [0.33 * r, 0.012], [0, 0.012]]
         profile = fillet(line, [0, 0.3 * r, 0.001, 0.001, 0.3 * r, 0], segments=6)
         profile[:, 0] *= r / profile[:, 0].max()
-        bowl = revolve(profile, segments=40)
+        bowl = revolve(profile, segments=SHADE_SEGMENTS)
         parts = [Part(translate(bowl, [0, y, 0]), metal)]
         # From the rim inside down to the axis; the rim itself is rounded.
         hollow = profile[np.argmax(profile[:, 1]) :]

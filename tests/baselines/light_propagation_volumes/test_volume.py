@@ -278,7 +278,7 @@ def test_a_grid_fills_its_box_and_has_no_cell_too_many():
     # 16 cells along the longest side are 10.4 along the last, 14 are 9.1.
     assert Grid.around(low, np.array([3.0, 2.0, 2.6]), 16).counts == (14, 7, 9)
     # A niche of .6 m behind one wall and of .1 m behind another.
-    more = Grid.around(low, high, 16, low - (0.6, 0, 0.1), high)
+    more = Grid.around(low, high, 16).reaching(low - (0.6, 0, 0.1), high)
     assert more.counts == (18, 8, 10)
     assert more.low == pytest.approx((-1.5, 0, 0))
     flat = Grid.around(np.zeros(3), np.array([1.0, 0, 0]), 8)
