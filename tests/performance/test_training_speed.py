@@ -76,7 +76,7 @@ NETWORKS = {
 
 @pytest.mark.parametrize("name", NETWORKS)
 def test_whether_bfloat16_pays(name):
-    """On a processor without tiles it does not, and `precision.mixed` leaves it."""
+    """On a processor without instructions for it, it does not, and `precision.mixed` leaves it."""
     torch.manual_seed(0)
     network, given = NETWORKS[name]()
     optimiser = torch.optim.Adam(network.parameters(), 1e-4)

@@ -1,4 +1,4 @@
-"""Half precision is for processors that have tiles, and networks learn in it what they learn in single precision."""
+"""Half precision is for processors that multiply it, and networks learn in it what they learn in single precision."""
 
 import pytest
 import torch
@@ -10,27 +10,44 @@ from gibench.baselines.training.reproducible import seeded
 CPU = torch.device("cpu")
 
 
-@pytest.fixture(params=[False, True], ids=["no-tiles", "tiles"])
-def tiles(request, monkeypatch):
-    monkeypatch.setattr(precision, "has_tiles", lambda: request.param)
+@pytest.fixture(params=[False, True], ids=["no-bfloat16", "bfloat16"])
+def multiplies(request, monkeypatch):
+    monkeypatch.setattr(precision, "multiplies", lambda: request.param)
     return request.param
 
 
-def test_products_are_of_bfloat16_where_there_are_tiles(tiles):
+def test_any_of_its_instructions_will_do(monkeypatch):
+    for name in precision.INSTRUCTIONS:
+        assert hasattr(torch.cpu, name)  # torch still calls it that
+        monkeypatch.setattr(torch.cpu, name, lambda: False)
+    assert not precision.multiplies()
+    for name in precision.INSTRUCTIONS:
+        with monkeypatch.context() as one:
+            one.setattr(torch.cpu, name, lambda: True)
+            assert precision.multiplies()
+
+
+def test_a_torch_without_those_words_has_none(monkeypatch):
+    for name in precision.INSTRUCTIONS:
+        monkeypatch.delattr(torch.cpu, name)
+    assert not precision.multiplies()
+
+
+def test_products_are_of_bfloat16_where_a_processor_multiplies_them(multiplies):
     layer = nn.Linear(3, 2)
     with precision.mixed(CPU):
         output = layer(torch.ones(1, 3))
-    assert output.dtype == (torch.bfloat16 if tiles else torch.float32)
+    assert output.dtype == (torch.bfloat16 if multiplies else torch.float32)
     output.float().sum().backward()
     assert layer.weight.dtype == layer.weight.grad.dtype == torch.float32
 
 
-def test_another_device_keeps_its_precision(tiles):
+def test_another_device_keeps_its_precision(multiplies):
     with precision.mixed(torch.device("meta")):
         assert nn.Linear(3, 2)(torch.ones(1, 3)).dtype == torch.float32
 
 
-def test_a_network_learns_in_it(tiles):
+def test_a_network_learns_in_it(multiplies):
     with seeded(0):
         network = nn.Sequential(nn.Linear(1, 32), nn.ReLU(), nn.Linear(32, 1))
         given = torch.linspace(-1, 1, 256)[:, None]
