@@ -8,12 +8,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import torch
 from torch import Tensor
 
 from gibench.baselines.training.errors import TrainingError
+
+LEAST_SLOPE = 0.02
+"""Of `Exponential`, per unit of the exponent: exp itself has 1e-6 of slope where it is 1e-6."""
 
 LARGEST = 1e5
 """Radiance that is still told from a larger one, unless it is given."""
@@ -113,9 +116,33 @@ class Exponential:
         return radiance.clamp(self.smallest, self.largest).log()
 
     def decode(self, code: Tensor) -> Tensor:
-        """To [smallest, largest]."""
-        exponent = _at_least_single(code).clamp(math.log(self.smallest), math.log(self.largest))
-        return exponent.exp().clamp(self.smallest, self.largest)
+        """To [smallest, largest].
+
+        Outside of the bounds gradients that lead back pass, as at the bound, and the slope is LEAST_SLOPE at least.
+        Without either, a network that overshoots in its first steps has no gradient left and learns nothing again.
+        """
+        light: Tensor = _Bounded.apply(_at_least_single(code), self.smallest, self.largest)
+        return light
+
+
+class _Bounded(torch.autograd.Function):
+    """exp within bounds; see `Exponential.decode`."""
+
+    @staticmethod
+    def forward(ctx: Any, code: Tensor, smallest: float, largest: float) -> Tensor:
+        light = code.clamp(math.log(smallest), math.log(largest)).exp().clamp(smallest, largest)
+        ctx.save_for_backward(code, light)
+        ctx.bounds = math.log(smallest), math.log(largest)
+        return light
+
+    @staticmethod
+    def backward(ctx: Any, *gradients: Tensor) -> tuple[Tensor, None, None]:
+        code, light = ctx.saved_tensors
+        lowest, highest = ctx.bounds
+        (gradient,) = gradients
+        # Descending, a negative gradient makes more light.
+        passes = ((code >= lowest) | (gradient < 0)) & ((code <= highest) | (gradient > 0))
+        return gradient * light.clamp(min=LEAST_SLOPE) * passes, None, None
 
 
 def _at_least_single(code: Tensor) -> Tensor:

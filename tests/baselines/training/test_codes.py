@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from gibench.baselines.training.codes import Exponential, LogCode, MuLaw
+from gibench.baselines.training.codes import LEAST_SLOPE, Exponential, LogCode, MuLaw
 from gibench.baselines.training.errors import TrainingError
 
 RADIANCE = np.concatenate([[0.0], np.logspace(-4, 5, 400)])
@@ -101,3 +101,40 @@ def test_gradients_are_finite_and_alive_within(code):
 def test_constants_that_make_no_code_are_named(make):
     with pytest.raises(TrainingError, match="code"):
         make()
+
+
+def slope(code, said, upstream):
+    said = torch.tensor(said, requires_grad=True)
+    (upstream * code.decode(said)).backward()
+    return float(said.grad)
+
+
+def test_the_slope_of_the_exponential_is_its_own_value_within_the_bounds():
+    code = Exponential(1e4, 1e-6)
+    for said in (-3.0, 0.0, 1.5, 9.0):
+        assert slope(code, said, 2.0) == pytest.approx(2 * math.exp(said), rel=1e-6)
+    # Where exp is all but flat, it is that of LEAST_SLOPE.
+    assert slope(code, -10.0, 2.0) == pytest.approx(2 * LEAST_SLOPE)
+
+
+@pytest.mark.parametrize("said", [-1e30, -50.0, 50.0, 1e30])
+def test_outside_of_the_bounds_gradients_lead_back_and_no_further(said):
+    code = Exponential(1e4, 1e-6)
+    outward = 1.0 if said < 0 else -1.0  # descending, a positive gradient makes less light
+    assert slope(code, said, outward) == 0
+    assert math.copysign(1, slope(code, said, -outward)) == -outward
+
+
+@pytest.mark.parametrize("said", [-60.0, 60.0])
+def test_what_a_network_says_comes_back_from_far_outside(said):
+    """The loss is that of networks from images to images: L1 of log(1 + light)."""
+    code = Exponential(1e4, 1e-6)
+    value = torch.nn.Parameter(torch.full((4,), said))
+    optimiser = torch.optim.Adam([value], lr=1.0)
+    for _ in range(400):
+        loss = (torch.log1p(code.decode(value)) - math.log(1.5)).abs().mean()
+        optimiser.zero_grad()
+        loss.backward()
+        optimiser.step()
+        optimiser.param_groups[0]["lr"] *= 0.99
+    torch.testing.assert_close(code.decode(value.detach()), torch.full((4,), 0.5), atol=0.05, rtol=0)
