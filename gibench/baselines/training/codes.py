@@ -130,9 +130,9 @@ class _Bounded(torch.autograd.Function):
 
     @staticmethod
     def forward(ctx: Any, code: Tensor, smallest: float, largest: float) -> Tensor:
-        light = code.clamp(math.log(smallest), math.log(largest)).exp().clamp(smallest, largest)
-        ctx.save_for_backward(code, light)
         ctx.bounds = math.log(smallest), math.log(largest)
+        light = code.clamp(*ctx.bounds).exp().clamp(smallest, largest)
+        ctx.save_for_backward(code, light)
         return light
 
     @staticmethod
