@@ -12,7 +12,10 @@ from gibench.baselines.compositional_scene_representations import network as cnn
 from gibench.baselines.compositional_scene_representations.network import Represented
 from gibench.baselines.efficient_light_probes.network import GUIDES, ReconstructionNetwork
 from gibench.baselines.image_to_image.shading import GEOMETRY, LIGHT
+from gibench.baselines.neural_free_viewpoint_relighting import network as nfvr
+from gibench.baselines.neural_free_viewpoint_relighting.network import HashField, TransportNetwork
 from gibench.baselines.neural_global_illumination.network import SMALL, NeuralGlobalIllumination
+from gibench.baselines.neural_precomputed_radiance_transfer.network import LightEncoder
 from gibench.baselines.training.budget import Budget
 from gibench.baselines.training.loop import train
 from gibench.baselines.training.reproducible import deterministic
@@ -56,6 +59,14 @@ def of_images(package):
     return implementation.network(), (torch.rand(2, LIGHT, 3, 128, 128), torch.randn(2, GEOMETRY, 128, 128))
 
 
+def wavelets():
+    """A step of the `cpu` preset: 4 frames, each with 96 of the wavelets of a cubemap of 32² a face."""
+    count = 6 * 32**2
+    places = torch.stack([torch.randperm(count)[:96] for _ in range(4)])
+    given = torch.rand(4, 128, 3), torch.rand(4, 128, 13), places, torch.rand(4, 96, 3)
+    return TransportNetwork(HashField(nfvr.SMALL, 15), nfvr.SMALL, 32), given
+
+
 NETWORKS = {
     "ngi, small": lambda: (NeuralGlobalIllumination(SMALL), (torch.randn(2, 34, 64, 64),)),
     "cnnr, small": lambda: (
@@ -67,6 +78,8 @@ NETWORKS = {
     "bcn": lambda: of_images("bilateral_network"),
     "pix2pix": lambda: of_images("pix2pix"),
     "resnet": lambda: of_images("resnet_generator"),
+    "nfvr, small": wavelets,
+    "the encoder of nprt": lambda: (LightEncoder(), (torch.rand(4, 3, 128, 256),)),
     "elp, 4 crops of 64²": lambda: (
         ReconstructionNetwork(),
         (torch.rand(4, 3, 64, 64), torch.rand(4, GUIDES, 64, 64)),

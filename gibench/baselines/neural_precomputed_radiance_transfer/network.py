@@ -113,8 +113,11 @@ class TransferNetwork(nn.Module):
 
         It is linear in the mean.
         """
-        radiance = self.decoded(points, material, towards_eye(material), self.encoder(picture))
-        return radiance * mean[:, None, None]
+        return self.lit(points, material, self.encoder(picture), mean)
+
+    def lit(self, points: Tensor, material: Tensor, light: Tensor, mean: Tensor) -> Tensor:
+        """As `forward`, under codes of light (N, 64)."""
+        return self.decoded(points, material, towards_eye(material), light) * mean[:, None, None]
 
     @torch.inference_mode()
     def frame(self, points: Tensor, material: Tensor, light: Tensor, mean: float) -> Tensor:

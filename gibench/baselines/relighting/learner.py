@@ -16,6 +16,7 @@ from gibench.baselines.training.batches import batches
 from gibench.baselines.training.learner import Learner, Step
 from gibench.baselines.training.loop import Batches
 from gibench.baselines.training.losses.pixels import absolute
+from gibench.baselines.training.precision import mixed
 from gibench.baselines.training.schedule import half_cosine, set_rate
 
 FRAMES = 4
@@ -56,6 +57,12 @@ class RelightingLearner(Learner):
     def judged(self, example: tuple[Seen, Light]) -> Example:
         """What of a frame that is held out is looked at: JUDGED_PIXELS at most."""
 
+    def made(self, example: Example) -> Tensor:
+        """What the network says of an example in a step, (F, N, 3)."""
+        with mixed(self.device):
+            found: Tensor = self.network(*example.inputs)
+        return found.float()
+
     @abstractmethod
     def loss(self, made: Tensor, true: Tensor) -> Tensor:
         """Of exposed radiance, (F, N, 3) each."""
@@ -75,6 +82,6 @@ class RelightingLearner(Learner):
         """Down the loss."""
         set_rate(self.optimisers["network"], self.rate * half_cosine(now.progress))
         example = Example(*batch).on(self.device)
-        loss = self.loss(self.network(*example.inputs), example.truth)
+        loss = self.loss(self.made(example), example.truth)
         self.descend("network", loss, largest_gradient=LARGEST_GRADIENT)
         return {"loss": loss.detach()}
