@@ -121,7 +121,7 @@ class Representing(Learner):
         )
         self.network.to(device)
         self.held_out = [Example(*(part.to(device) for part in widened(one))) for one in judged]
-        optimiser = torch.optim.Adam(self.network.parameters(), lr=RATES[plan.network])
+        optimiser = torch.optim.Adam(self.network.parameters(), lr=RATES[plan.network], fused=True)
         super().__init__({"network": self.network}, {"network": optimiser})
 
     def trained(self, checkpoint: Checkpoint | None) -> Trained:

@@ -161,7 +161,7 @@ class Reconstructing(Learner):
             self.network = ReconstructionNetwork(plan.fusion)
         self.network.to(device)
         self.lpips_network = build_network("vgg").to(device) if plan.lpips else None
-        optimiser = torch.optim.Adam(self.network.parameters(), lr=RATE)
+        optimiser = torch.optim.Adam(self.network.parameters(), lr=RATE, fused=True)
         super().__init__({"network": self.network}, {"network": optimiser})
 
     @property

@@ -96,13 +96,16 @@ class IndirectLight(Learner):
         self.network = network
         device = next(network.parameters()).device
         networks = {"network": network}
-        optimisers = {"network": torch.optim.Adam(network.parameters(), lr=RATE)}
+        optimisers = {"network": torch.optim.Adam(network.parameters(), lr=RATE, fused=True)}
         if plan.adversarial:
             with seeded(plan.seed):
                 discriminator = PatchGan(LIGHT + 1).to(device)
             networks["judge"] = discriminator
             optimisers["judge"] = torch.optim.Adam(
-                discriminator.parameters(), lr=DISCRIMINATOR_RATE, betas=(DISCRIMINATOR_BETA, 0.999)
+                discriminator.parameters(),
+                lr=DISCRIMINATOR_RATE,
+                betas=(DISCRIMINATOR_BETA, 0.999),
+                fused=True,
             )
         self.features = Vgg16Features().to(device) if plan.perceptual else None
         self.anew_at = LOOKED_FROM if plan.perceptual or plan.adversarial else 0.0

@@ -151,7 +151,7 @@ class Regressing(Learner):
         networks.begin_at(self._means())
         self.cells = networks.to(device)
         self.judged = [Points(*(part.to(device) for part in one)) for one in judged]
-        optimiser = torch.optim.Adam(self.cells.parameters(), lr=RATE)
+        optimiser = torch.optim.Adam(self.cells.parameters(), lr=RATE, fused=True)
         super().__init__({"cells": self.cells}, {"cells": optimiser})
 
     def _means(self) -> Tensor:

@@ -43,7 +43,7 @@ class RelightingLearner(Learner):
     def __init__(self, network: nn.Module, examples: Drawn, apart: Examples, seed: int) -> None:
         """network: on its device. examples: what `draw` is given. apart: what is held out."""
         self.examples, self.network, self.seed = examples, network, seed
-        optimiser = torch.optim.Adam(network.parameters(), lr=self.rate, eps=self.epsilon)
+        optimiser = torch.optim.Adam(network.parameters(), lr=self.rate, eps=self.epsilon, fused=True)
         super().__init__({"network": network}, {"network": optimiser})
         # Read once, and before any clock says what a look takes.
         found = [self.judged(apart[index]) for index in range(len(apart))]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from itertools import product
 
 import torch
 from torch import Tensor, nn
@@ -25,6 +24,8 @@ class HashGrid(nn.Module):
     """
 
     offsets: Tensor
+    cells: Tensor
+    steps: Tensor
 
     def __init__(
         self, *, levels: int = 16, features: int = 2, table: int = 2**19, base: int = 16, growth: float = 1.38
@@ -41,8 +42,14 @@ class HashGrid(nn.Module):
         self.table, self.features = table, features
         self.resolutions = [math.floor(base * growth**level) for level in range(levels)]
         self.sizes = [min((cells + 1) ** 3, table) for cells in self.resolutions]
+        # Resolutions never fall, so levels whose corners all fit come before those that hash.
+        self.dense = sum((cells + 1) ** 3 <= table for cells in self.resolutions)
+        steps = [(1, cells + 1, (cells + 1) ** 2) for cells in self.resolutions[: self.dense]]
+        steps += [PRIMES] * (levels - self.dense)
         starts = [sum(self.sizes[:level]) for level in range(levels)]
         self.register_buffer("offsets", torch.tensor(starts), persistent=False)
+        self.register_buffer("cells", torch.tensor(self.resolutions)[:, None], persistent=False)
+        self.register_buffer("steps", torch.tensor(steps), persistent=False)
         self.entries = nn.Parameter(torch.empty(sum(self.sizes), features).uniform_(-INITIAL, INITIAL))
 
     @property
@@ -52,36 +59,24 @@ class HashGrid(nn.Module):
 
     def forward(self, points: Tensor) -> Tensor:
         """(…, 3) in [0, 1], clamped to it, to (…, levels · features)."""
-        flat = points.reshape(-1, 3).clamp(0, 1)
-        indices, weights = [], []
-        for cells, offset, size in zip(self.resolutions, self.offsets, self.sizes, strict=True):
-            scaled = flat * cells
-            low = scaled.detach().floor().clamp(max=cells - 1)
-            inside = scaled - low
-            corner = low.long()
-            index, weight = zip(
-                *(self._corner(corner, inside, cells, size, at) for at in CORNERS), strict=True
-            )
-            indices.append(torch.stack(index, dim=-1) + offset)
-            weights.append(torch.stack(weight, dim=-1))
+        scaled = points.reshape(-1, 1, 3).clamp(0, 1) * self.cells  # (N, levels, 3)
+        low = torch.minimum(scaled.detach().floor(), self.cells - 1)
+        inside = scaled - low
+        # Of the lower corner and the upper, along each axis: (N, levels, 2) each.
+        x, y, z = torch.stack([1 - inside, inside], dim=-1).unbind(dim=-2)
+        weights = (x[..., :, None, None] * y[..., None, :, None] * z[..., None, None, :]).flatten(-3)
         # One gather for all levels; where torch is to be deterministic its gradient adds in an order of its own.
-        values = self.entries[torch.stack(indices, dim=1)]
-        mixed = (torch.stack(weights, dim=1)[..., None] * values).sum(dim=2)
+        values = self.entries[self._entries(low.long())]  # (N, levels, 8, features)
+        mixed = (weights[..., None] * values).sum(dim=-2)
         return mixed.reshape(*points.shape[:-1], self.channels)
 
-    def _corner(
-        self, corner: Tensor, inside: Tensor, cells: int, size: int, at: tuple[int, ...]
-    ) -> tuple[Tensor, Tensor]:
-        """Entry of the corner of a cell, and its weight."""
-        x, y, z = (corner[:, axis] + at[axis] for axis in range(3))
-        shares = [inside[:, axis] if at[axis] else 1 - inside[:, axis] for axis in range(3)]
-        if (cells + 1) ** 3 <= size:
-            index = x + (cells + 1) * (y + (cells + 1) * z)
-        else:
-            # The low bits of a product are the same in 64 bits as in the 32 that overflow in the paper.
-            index = (x * PRIMES[0] ^ y * PRIMES[1] ^ z * PRIMES[2]) & (self.table - 1)
-        return index, shares[0] * shares[1] * shares[2]
-
-
-CORNERS = tuple(product((0, 1), repeat=3))
-"""Of a cell, along x, y and z."""
+    def _entries(self, low: Tensor) -> Tensor:
+        """Entries (N, levels, 8) of the corners of cells whose lowest corners are (N, levels, 3), x slowest."""
+        lower = low * self.steps
+        x, y, z = torch.stack([lower, lower + self.steps], dim=-1).unbind(dim=-2)  # (N, levels, 2) each
+        x, y, z = x[..., :, None, None], y[..., None, :, None], z[..., None, None, :]
+        own, shared = slice(self.dense), slice(self.dense, None)
+        # The low bits of a product are the same in 64 bits as in the 32 that overflow in the paper.
+        hashed = (x[:, shared] ^ y[:, shared] ^ z[:, shared]) & (self.table - 1)
+        found = torch.cat([x[:, own] + y[:, own] + z[:, own], hashed], dim=1).flatten(-3)
+        return found + self.offsets[:, None]
