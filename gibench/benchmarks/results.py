@@ -17,8 +17,9 @@ from gibench.benchmarks.costs import BOOKED
 from gibench.benchmarks.errors import ResultsError
 from gibench.benchmarks.references import reference_parts
 from gibench.benchmarks.result_files import RunFolder
-from gibench.benchmarks.scenes import SceneFiles, scenes_in
+from gibench.benchmarks.scenes import STILLS, SceneFiles, scenes_in
 from gibench.benchmarks.scoring import exposures_of, read_scores
+from gibench.datasets.errors import nearest
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -84,6 +85,50 @@ class Results:
                 newest.values(), key=lambda r: (r["room"], r["config"]["method"], r["label"])
             )
         }
+
+    def among(self, *, room: str | None = None, group: str | None = None) -> Results:
+        """The same with the frames of one room alone, of one group of frames, or of both.
+
+        room: name of a scene. group: one that frames are of, such as "stills", "near", "indoor", or the name of a
+        sequence. A sequence is among a group if its frames are. Raises ResultsError for what is not there.
+        """
+        records = list(self._records.values())
+        if room is not None:
+            rooms = sorted({str(record["config"]["scene"]) for record in records})
+            if room not in rooms:
+                raise ResultsError(f"{self.root} has no room '{room}'; {nearest(room, rooms)}")
+            records = [record for record in records if record["config"]["scene"] == room]
+        some = Results(self.folder, self.run, records)
+        if group is None:
+            return some
+        tags = {record["id"]: record.get("tags", []) for record in records}
+        groups = sorted({tag for own in tags.values() for one in own for tag in one})
+        if group not in groups:
+            known = nearest(group, groups) if groups else "its frames are all of one"
+            raise ResultsError(f"{self.root} has no group of frames '{group}'; {known}")
+        scene_tags = {str(record["config"]["scene"]): tags[record["id"]] for record in records}
+        sequences = {scene: {one[0] for one in own if group in one} for scene, own in scene_tags.items()}
+        frames, paths, floor = some.frames, some.sequences, some.floor
+        of = some.results.set_index("result")["scene"]
+        some.frames = frames[
+            [group in tags[id][number] for id, number in zip(frames["result"], frames["frame"], strict=True)]
+        ]
+        some.sequences = paths[
+            [name in sequences[of[id]] for id, name in zip(paths["result"], paths["sequence"], strict=True)]
+        ]
+        order = {
+            scene: list(dict.fromkeys(one[0] for one in own if one[0] != STILLS))
+            for scene, own in scene_tags.items()
+        }
+        some.floor = floor[
+            [
+                group in scene_tags[scene][number]
+                if number > WHOLE_PATH
+                else order[scene][WHOLE_PATH - number] in sequences[scene]
+                for scene, number in zip(floor["scene"], floor["frame"], strict=True)
+            ]
+        ]
+        return some
 
     @cached_property
     def results(self) -> pd.DataFrame:

@@ -213,6 +213,18 @@ def compare(
     ] = None,
     metric: Annotated[str, typer.Option(help="Of two folders: the metric to compare by.")] = "rmse_display",
     part: Annotated[str, typer.Option(help="Of two folders: full, specular or indirect.")] = "full",
+    room: Annotated[
+        str | None,
+        typer.Option(
+            help="One room alone, such as room-000000; intervals are over its frames.", show_default=False
+        ),
+    ] = None,
+    group: Annotated[
+        str | None,
+        typer.Option(
+            help="One group of frames alone: stills, near, indoor, a sequence …", show_default=False
+        ),
+    ] = None,
 ) -> None:
     """Compare two runs, or two methods of one run, on the same frames."""
     from gibench.benchmarks.errors import ResultsError
@@ -221,13 +233,15 @@ def compare(
     from gibench.cli import bench_printing as printing
     from gibench.metrics import metric as descriptor
 
+    where = ", ".join(name for name in (room, group) if name)
     if within is not None:
-        printing.print_methods_compared(load(within), first, second)
+        printing.print_methods_compared(load(within).among(room=room, group=group), first, second, where)
         return
     descriptor(metric)
     if part not in PARTS:
         raise ResultsError(f"--part: '{part}' is not allowed; allowed are {', '.join(PARTS)}")
-    printing.print_runs_compared(load(first), load(second), metric, part)
+    one, other = (load(folder).among(room=room, group=group) for folder in (first, second))
+    printing.print_runs_compared(one, other, metric, part, where)
 
 
 @app.command("report")

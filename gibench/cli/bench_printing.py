@@ -200,11 +200,16 @@ def print_methods(track: str | None) -> None:
         say(f"error: {broken}", err=True)
 
 
-def print_methods_compared(results: Results, first: str, second: str) -> None:
-    """Print the paired comparison of two methods of a run, a row a metric and part: the track's, then others scored."""
+def print_methods_compared(results: Results, first: str, second: str, where: str = "") -> None:
+    """Print the paired comparison of two methods of a run, a row a metric and part: the track's, then others scored.
+
+    where: which of the frames these are, "" for all.
+    """
     one, other = _one_label(results, first), _one_label(results, second)
     _row("first", one)
     _row("second", other)
+    if where:
+        _row("frames of", where)
     _times(results, one, results, other)
     _head("metric")
     names = dict.fromkeys(
@@ -215,14 +220,16 @@ def print_methods_compared(results: Results, first: str, second: str) -> None:
             _compared(f"{name} {part}", results, one, results, other, name, part)
 
 
-def print_runs_compared(first: Results, second: Results, name: str, part: str) -> None:
-    """Print the paired comparison of what two runs have in common, a row a label."""
+def print_runs_compared(first: Results, second: Results, name: str, part: str, where: str = "") -> None:
+    """Print the paired comparison of what two runs have in common, a row a label. where: as above."""
     both = [label for label in dict.fromkeys(first.results["label"]) if label in set(second.results["label"])]
     if not both:
         raise GibenchError(f"{first.root} and {second.root} have no method and setting in common")
     _row("first", str(first.root))
     _row("second", str(second.root))
     _row("compared by", f"{name} of the {part} image, first less second")
+    if where:
+        _row("frames of", where)
     _head("method")
     for label in both:
         _compared(label, first, label, second, label, name, part)

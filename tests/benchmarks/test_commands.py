@@ -167,6 +167,10 @@ def test_from_a_run_to_comparisons(capsys, tmp_path, track, scenes_only):
     assert re.search(r"psnr full +[+-]", said)  # none of the track's
     assert max(map(len, said.splitlines())) <= 80
     assert re.search(r"times +\d+\.\d and \d+\.\d ms, prepared in", said)
+    within = ["bench", "compare", "--in", str(scenes_only), "constant shade=0.25", "plain"]
+    assert run(app, [*within, "--room", "room-000000"]) == 0
+    assert re.search(r"^frames of +room-000000$", capsys.readouterr().out, re.M)
+    assert "no room 'kitchen'" in refused(capsys, *within[1:], "--room", "kitchen")
     assert run(app, ["bench", "compare", str(scenes_only), str(scenes_only)]) == 0
     said = capsys.readouterr().out
     assert re.search(r"constant shade=0.25 +\+0 +\+0 +\+0  unsure", said)

@@ -140,3 +140,32 @@ def test_ids_leave_out_what_is_half_written(tmp_path):
     for name in ("0123456789abcdef.json", ".0123456789abcdef.json.partial-7", "notes.json"):
         (folder.results / name).touch()
     assert folder.ids() == ["0123456789abcdef"]
+
+
+def test_some_of_the_frames(copy, results):
+    """Groups are tags of frames; a sequence is of a group if its frames are, and noise floors go with them."""
+    (name,) = set(results.sequences["sequence"])
+    tags = [["stills", "near", "indoor"], ["stills", "far", "outdoor"], [name, "outdoor"]]
+    for id in copy.ids():
+        path = copy.result_file(id)
+        path.write_text(json.dumps(json.loads(path.read_text()) | {"tags": tags}))
+    run = load(copy.root)
+    for group, frames, sequences in [
+        ("near", {0}, False),
+        ("stills", {0, 1}, False),
+        ("outdoor", {1, 2}, True),
+        (name, {2}, True),
+    ]:
+        some = run.among(room="room-000000", group=group)
+        assert set(some.frames["frame"]) == frames
+        kept = run.frames[run.frames["frame"].isin(frames)]
+        assert some.frames["value"].tolist() == kept["value"].tolist()
+        assert some.sequences.empty != sequences
+        assert set(some.floor["frame"]) == (frames | {-1} if sequences else frames)
+    assert run.among(room="room-000000").frames.equals(run.frames)
+    with pytest.raises(ResultsError, match=r"no room 'room-00000'; did you mean 'room-000000'"):
+        run.among(room="room-00000")
+    with pytest.raises(ResultsError, match=r"no group of frames 'door'; did you mean '(in|out)door'"):
+        run.among(group="door")
+    with pytest.raises(ResultsError, match="no group of frames 'near'"):
+        results.among(group="near")
