@@ -146,7 +146,9 @@ class Draw:
         further = min((learned - first) // 2, count - first)
         in_order = largest(coefficients, min(first + max(NEXT, further), count), WEIGHTING)
         chosen = np.concatenate([in_order[:first], random.choice(in_order[first:], further, replace=False)])
-        rest = np.setdiff1d(np.arange(count), chosen, assume_unique=True)
+        left = np.ones(count, bool)
+        left[chosen] = False
+        rest = np.flatnonzero(left)
         return np.concatenate([chosen, random.choice(rest, learned - len(chosen), replace=False)])
 
     def _drawn(

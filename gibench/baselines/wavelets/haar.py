@@ -10,6 +10,7 @@ Functions take NumPy arrays and PyTorch tensors alike.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -74,9 +75,12 @@ def inverse_haar(coefficients: Image) -> Image:
     return result
 
 
+@lru_cache(maxsize=8)
 def supports(side: int) -> NDArray[np.float64]:
-    """(side, side) on how many texels each coefficient's wavelet is not 0; side² for the sum."""
+    """(side, side) on how many texels each coefficient's wavelet is not 0; side² for the sum. Not to be written to."""
     place = np.maximum(*np.mgrid[0:side, 0:side])
     # The wavelets whose place is from h on, below 2·h, divide the picture into h × h parts.
     level = np.where(place > 0, 2 ** np.floor(np.log2(np.maximum(place, 1))), 1)
-    return np.asarray((side / level) ** 2)
+    found = np.asarray((side / level) ** 2)
+    found.flags.writeable = False
+    return found

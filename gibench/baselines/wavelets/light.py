@@ -43,14 +43,15 @@ def magnitudes(faces: int) -> NDArray[np.float64]:
     return np.sqrt(supports(faces)) * (4 * np.pi / (6 * faces**2))
 
 
-def weights_of(coefficients: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(6·S², 3) weights of coefficients (6, S, S, 3), as `WaveletLight` has them."""
-    return (coefficients * magnitudes(coefficients.shape[1])[..., None]).reshape(-1, coefficients.shape[-1])
+def weights_of(coefficients: NDArray[np.float64], places: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(K, 3) weights of some of the coefficients (6, S, S, 3), as `WaveletLight` has them."""
+    size = magnitudes(coefficients.shape[1]).ravel()
+    return coefficients.reshape(-1, coefficients.shape[-1])[places] * size[places % size.size, None]
 
 
 def light_at(coefficients: NDArray[np.float64], places: NDArray[np.int64]) -> WaveletLight:
     """The light in certain wavelets, whether there is any or not."""
-    return WaveletLight(places, weights_of(coefficients)[places].astype(np.float32))
+    return WaveletLight(places, weights_of(coefficients, places).astype(np.float32))
 
 
 def chosen_light(coefficients: NDArray[np.float64], count: int, weighting: Weighting) -> WaveletLight:

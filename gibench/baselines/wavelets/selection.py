@@ -33,7 +33,11 @@ def largest(
     magnitude = np.abs(coefficients).sum(axis=-1, dtype=np.float64) * supports(side) ** POWERS[weighting]
     if not 1 <= count <= magnitude.size:
         raise WaveletError(f"{count} wavelets of {magnitude.size}: choose from 1 to all")
-    return np.argsort(-magnitude.ravel(), kind="stable")[:count]
+    least_first = -magnitude.ravel()
+    # Sorting those alone that can be among them takes a fraction of sorting all.
+    last = np.partition(least_first, count - 1)[count - 1]
+    within = np.flatnonzero(least_first <= last)
+    return within[np.argsort(least_first[within], kind="stable")[:count]]
 
 
 def energy_kept(coefficients: NDArray[np.floating], places: NDArray[np.int64]) -> float:

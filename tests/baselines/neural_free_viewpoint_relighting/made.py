@@ -25,7 +25,7 @@ class Made:
             points[:, 2] = 0.5
             faces = random.gamma(0.5, size=(6, FACES, FACES, 3))
             coefficients = haar(faces)
-            above = weights_of(coefficients).reshape(6, FACES, FACES, 3)[4, 0, 0]
+            above = weights_of(coefficients, np.array([4 * FACES**2]))[0]
             truth = 0.25 * points[:, :1] * above
             material = np.tile([0, 0, 1, 0, 0, 1, 1.0, 0.5, 0.5, 0.5, 0, 0, 0], (pixels, 1))
             arrays = (points, material, truth, np.abs(points[:, 0] - 0.5))

@@ -31,7 +31,7 @@ def test_a_weight_is_the_integral_of_what_its_wavelet_gives(size):
     integrals = np.abs(inverse_haar(one)).sum(axis=(1, 2, 3)) * 4 * np.pi / (6 * size**2)
     np.testing.assert_allclose(magnitudes(size).ravel(), integrals)
     # Of a constant, the sums alone weigh anything: together 4π times its radiance.
-    weights = weights_of(haar(np.full((6, size, size, 3), 0.5)))
+    weights = weights_of(haar(np.full((6, size, size, 3), 0.5)), np.arange(6 * size**2))
     np.testing.assert_allclose(weights.sum(axis=0), 0.5 * 4 * np.pi)
 
 

@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from gibench.baselines.wavelets.haar import WaveletError, haar, inverse_haar, supports
-from gibench.baselines.wavelets.selection import energy_kept, largest, only, replaced
+from gibench.baselines.wavelets.selection import POWERS, energy_kept, largest, only, replaced
 from gibench.generators.environments.files import environment_files, read_environment
 from gibench.rendering.cubemap import to_cubemap
 
@@ -73,6 +73,17 @@ def test_the_largest_come_first_and_weights_count():
     assert np.count_nonzero(kept) == 1
     assert energy_kept(coefficients, largest(coefficients, 1)) == pytest.approx(36 / (36 + 3 * 0.81 + 4.25))
     assert energy_kept(np.zeros((4, 4, 3)), np.array([0])) == 1.0
+
+
+@pytest.mark.parametrize("weighting", POWERS)
+@pytest.mark.parametrize("count", [1, 7, 383, 384])
+def test_of_equal_ones_the_smaller_places_are_chosen(weighting, count):
+    """As sorting all of them would have it; digits are few, so that many are equal."""
+    coefficients = np.random.default_rng(count).normal(size=(6, 8, 8, 3)).round(1)
+    magnitude = np.abs(coefficients).sum(axis=-1) * supports(8) ** POWERS[weighting]
+    expected = np.argsort(-magnitude.ravel(), kind="stable")[:count]
+    np.testing.assert_array_equal(largest(coefficients, count, weighting), expected)
+    np.testing.assert_array_equal(largest(np.zeros((6, 8, 8, 3)), count, weighting), np.arange(count))
 
 
 def test_without_weights_no_other_choice_keeps_more_energy():
