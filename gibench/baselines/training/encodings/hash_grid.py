@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from itertools import product
+from typing import Any
 
 import torch
 from torch import Tensor, nn
@@ -44,12 +46,16 @@ class HashGrid(nn.Module):
         self.sizes = [min((cells + 1) ** 3, table) for cells in self.resolutions]
         # Resolutions never fall, so levels whose corners all fit come before those that hash.
         self.dense = sum((cells + 1) ** 3 <= table for cells in self.resolutions)
-        steps = [(1, cells + 1, (cells + 1) ** 2) for cells in self.resolutions[: self.dense]]
-        steps += [PRIMES] * (levels - self.dense)
+        own = self.resolutions[: self.dense]
+        steps: list[tuple[int, ...]] = [(1, cells + 1, (cells + 1) ** 2) for cells in own]
+        # Of a product, the low bits are all that counts, and they are those of the product of low bits.
+        steps += [tuple(prime % table for prime in PRIMES)] * (levels - self.dense)
         starts = [sum(self.sizes[:level]) for level in range(levels)]
-        self.register_buffer("offsets", torch.tensor(starts), persistent=False)
+        largest = max((self.resolutions[-1] + 1) * table, sum(self.sizes))
+        whole = torch.int32 if largest < 2**31 else torch.int64
+        self.register_buffer("offsets", torch.tensor(starts, dtype=whole)[:, None], persistent=False)
         self.register_buffer("cells", torch.tensor(self.resolutions)[:, None], persistent=False)
-        self.register_buffer("steps", torch.tensor(steps), persistent=False)
+        self.register_buffer("steps", torch.tensor(steps, dtype=whole).T[..., None], persistent=False)
         self.entries = nn.Parameter(torch.empty(sum(self.sizes), features).uniform_(-INITIAL, INITIAL))
 
     @property
@@ -59,24 +65,53 @@ class HashGrid(nn.Module):
 
     def forward(self, points: Tensor) -> Tensor:
         """(…, 3) in [0, 1], clamped to it, to (…, levels · features)."""
-        scaled = points.reshape(-1, 1, 3).clamp(0, 1) * self.cells  # (N, levels, 3)
+        # Points come last, so that all that is done level by level and corner by corner runs along them.
+        scaled = points.reshape(-1, 3).T[:, None].clamp(0, 1) * self.cells  # (3, levels, N)
         low = torch.minimum(scaled.detach().floor(), self.cells - 1)
         inside = scaled - low
-        # Of the lower corner and the upper, along each axis: (N, levels, 2) each.
-        x, y, z = torch.stack([1 - inside, inside], dim=-1).unbind(dim=-2)
-        weights = (x[..., :, None, None] * y[..., None, :, None] * z[..., None, None, :]).flatten(-3)
-        # One gather for all levels; where torch is to be deterministic its gradient adds in an order of its own.
-        values = self.entries[self._entries(low.long())]  # (N, levels, 8, features)
-        mixed = (weights[..., None] * values).sum(dim=-2)
-        return mixed.reshape(*points.shape[:-1], self.channels)
+        along_x, along_y, along_z = zip(1 - inside, inside, strict=True)
+        weights = [xy * z for xy in (x * y for x in along_x for y in along_y) for z in along_z]
+        found = _Interpolated.apply(self.entries, self._corners(low), torch.stack(weights, dim=-1))
+        return found.movedim(0, 1).reshape(*points.shape[:-1], self.channels)
 
-    def _entries(self, low: Tensor) -> Tensor:
-        """Entries (N, levels, 8) of the corners of cells whose lowest corners are (N, levels, 3), x slowest."""
-        lower = low * self.steps
-        x, y, z = torch.stack([lower, lower + self.steps], dim=-1).unbind(dim=-2)  # (N, levels, 2) each
-        x, y, z = x[..., :, None, None], y[..., None, :, None], z[..., None, None, :]
+    def _corners(self, low: Tensor) -> Tensor:
+        """Entries (levels, N, 8) of the corners of cells whose lowest corners are (3, levels, N), x slowest."""
+        lower = low.to(self.steps.dtype) * self.steps
         own, shared = slice(self.dense), slice(self.dense, None)
-        # The low bits of a product are the same in 64 bits as in the 32 that overflow in the paper.
-        hashed = (x[:, shared] ^ y[:, shared] ^ z[:, shared]) & (self.table - 1)
-        found = torch.cat([x[:, own] + y[:, own] + z[:, own], hashed], dim=1).flatten(-3)
-        return found + self.offsets[:, None]
+        along_x, along_y, along_z = zip(lower, lower + self.steps, strict=True)
+        found = []
+        for x, y, z in product(along_x, along_y, along_z):
+            hashed = (x[shared] ^ y[shared] ^ z[shared]) & (self.table - 1)
+            found.append(torch.cat([x[own] + y[own] + z[own], hashed]) + self.offsets)
+        return torch.stack(found, dim=-1)
+
+
+class _Interpolated(torch.autograd.Function):
+    """Sums of entries (E, F) by their numbers (L, N, 8) and weights (L, N, 8): (L, N, F).
+
+    torch's own sum of bags of rows, without an array of all rows; its own gradient takes longer than the rest of a
+    step of a small network.
+    """
+
+    @staticmethod
+    def forward(ctx: Any, entries: Tensor, numbers: Tensor, weights: Tensor) -> Tensor:
+        ctx.save_for_backward(entries, numbers, weights)
+        found = nn.functional.embedding_bag(
+            numbers.flatten(0, 1), entries, per_sample_weights=weights.flatten(0, 1), mode="sum"
+        )
+        return found.view(*numbers.shape[:2], entries.shape[1])
+
+    @staticmethod
+    def backward(ctx: Any, *gradients: Tensor) -> tuple[Tensor | None, None, Tensor | None]:
+        entries, numbers, weights = ctx.saved_tensors
+        gradient = gradients[0][..., None, :]
+        of_entries = of_weights = None
+        if ctx.needs_input_grad[0]:
+            features = entries.shape[1]
+            places = numbers.long()[..., None] * features + torch.arange(features, device=numbers.device)
+            shares = weights[..., None] * gradient
+            of_entries = entries.new_zeros(entries.numel())
+            of_entries = of_entries.scatter_add_(0, places.flatten(), shares.flatten()).view_as(entries)
+        if ctx.needs_input_grad[2]:
+            of_weights = (entries[numbers.long()] * gradient).sum(dim=-1)
+        return of_entries, None, of_weights
