@@ -56,11 +56,15 @@ def test_a_frame(name, size, table):
     network, points, material = made(size, table)
     lights = {count: (torch.arange(count), torch.randn(count, 3)) for count in (16, 64, 256)}
     frames = [partial(network.frame, points, material, *light) for light in lights.values()]
-    *folded, unfolded = seconds(*frames, partial(plain, network, points, material, *lights[64]), repeats=3)
+    frames.append(partial(network.frame, points, material, *lights[64], precision=torch.bfloat16))
+    *folded, rough, unfolded = seconds(
+        *frames, partial(plain, network, points, material, *lights[64]), repeats=3
+    )
     times = dict(zip(lights, folded, strict=True))
     told = ", ".join(f"{count} wavelets {1e3 * time:.0f} ms" for count, time in times.items())
     print(
-        f"\n{name}, 128 × 128: {told}; the plain form takes {unfolded / times[64]:.2f} times as long with 64"
+        f"\n{name}, 128 × 128: {told}; with 64 the plain form takes {unfolded / times[64]:.2f} times as long, bfloat16 "
+        f"{rough / times[64]:.2f}"
     )
     assert times[64] < unfolded
     if name == "small":

@@ -13,6 +13,7 @@ WAVELETS = (
         ("none", "root-area", "area"),
         "what coefficients are weighted by before the largest are chosen: the area of their wavelet's support",
     ),
+    Knob("precision", "single", ("bfloat16", "single"), "of the products of a frame"),
 )
 """Of all methods whose light is in wavelets; none of them needs another training."""
 

@@ -34,6 +34,7 @@ class NeuralRelighting(RelitByNetwork):
         self._wavelets = int(settings["wavelets"])
         self._before = np.zeros(0, dtype=np.int64)
         self._selection = cast("Weighting", settings["selection"])
+        self._precision = {"single": torch.float32, "bfloat16": torch.bfloat16}[str(settings["precision"])]
 
     def field(self, size: Size) -> nn.Module:
         """Where features of places come from."""
@@ -70,4 +71,4 @@ class NeuralRelighting(RelitByNetwork):
 
     def radiance(self, points: Tensor, material: Tensor, told: tuple[Tensor, Tensor]) -> Tensor:
         """The dot product of light and transport."""
-        return self.network.frame(points, material, *told)
+        return self.network.frame(points, material, *told, precision=self._precision)

@@ -115,6 +115,23 @@ def test_huge_light_and_hard_surfaces_are_finite():
     assert found.isfinite().all()
 
 
+def test_bfloat16_is_off_by_its_digits():
+    """Numbers have 8 of them and are off by 2⁻⁹ at most; a sum of signed ones by a few times as much."""
+    net = network()
+    points, material = pixels(300)
+    places, weights = light(64)
+    exact, rough = (
+        net.frame(points, material, places, weights, precision=precision)
+        for precision in (torch.float32, torch.bfloat16)
+    )
+    assert rough.dtype == torch.float32
+    away = (rough - exact).abs().mean() / exact.abs().mean()
+    assert 1e-4 < away < 0.02
+    assert not net.frame(points, material, places, 0 * weights, precision=torch.bfloat16).any()
+    huge = net.frame(points, material, places, 1e7 * weights, precision=torch.bfloat16)
+    torch.testing.assert_close(huge / 1e7, rough, rtol=0.05, atol=0.02 * float(exact.abs().max()))
+
+
 class Largest(TorchDispatchMode):
     """The number of elements of the largest tensor that is made."""
 
