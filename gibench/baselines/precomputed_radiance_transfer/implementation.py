@@ -139,11 +139,11 @@ class Arrived:
             matrices = self._matrices[torch.from_numpy(some)][..., : self._taken.shape[1]].float()
             self._found[some] = torch.einsum("ricj,cj->ric", matrices, self._taken).numpy()
         self._known[missing] = True
-        found, shares = torch.from_numpy(self._found), torch.from_numpy(weights)
-        mixed = found[torch.from_numpy(rows[:, 0])] * shares[:, 0, None, None]
-        for corner in (1, 2):
-            mixed += found[torch.from_numpy(rows[:, corner])] * shares[:, corner, None, None]
-        return mixed
+        found = torch.from_numpy(self._found)
+        mixed = torch.nn.functional.embedding_bag(
+            torch.from_numpy(rows), found.flatten(1), per_sample_weights=torch.from_numpy(weights), mode="sum"
+        )
+        return mixed.unflatten(1, found.shape[1:])
 
 
 def seen_box(site: Site, frames: DeviceFrames) -> Box:

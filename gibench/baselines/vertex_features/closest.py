@@ -43,7 +43,8 @@ class ClosestTriangles:
             mesh.vertices if facing is None else facing.beside(mesh.vertices, facing.normals), np.float64
         )
         self._tree = cKDTree(self._features)
-        self._at = _triangles_at(mesh)
+        self._at, self._first = _triangles_at(mesh)
+        self._shares = _shares(mesh.vertices[mesh.triangles].astype(np.float64))
 
     def __call__(
         self, places: NDArray[np.floating], normals: NDArray[np.floating] | None = None
@@ -70,45 +71,55 @@ class ClosestTriangles:
         self, asked: NDArray[np.floating], number: int
     ) -> tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.float64]]:
         """Corners, weights and distances by the triangles at the `number` closest vertices."""
-        nearest = self._tree.query(asked, k=[*range(1, number + 1)])[1]  # (N, number)
-        candidates = self.mesh.triangles[
-            self._at[nearest].reshape(len(asked), number * AROUND)
-        ]  # (N, number · AROUND, 3)
-        weights = _barycentric(self.mesh.vertices[candidates].astype(np.float64), asked[:, None, :3])
-        feet = np.einsum("nkp,nkpc->nkc", weights, self._features[candidates])
-        away = np.linalg.norm(feet - asked[:, None], axis=-1)
-        best = away.argmin(axis=1)[:, None]
+        nearest = self._tree.query(asked, k=[*range(1, number + 1)])[1].ravel()  # (N · number,)
+        first, many = self._first[nearest], np.diff(self._first)[nearest]
+        # All triangles at the vertices of a place, one place after the other.
+        begin = np.cumsum(many) - many
+        candidate = self._at[np.repeat(first - begin, many) + np.arange(many.sum())]  # (M,)
+        starts = begin[::number]
+        sizes = np.diff(starts, append=len(candidate))
+        place = np.repeat(asked, sizes, axis=0)
+        weights = _barycentric(self._shares[candidate], place[:, :3])
+        feet = np.einsum("mp,mpc->mc", weights, self._features[self.mesh.triangles[candidate]])
+        away = np.square(feet - place).sum(axis=1)
+        nearer = np.flatnonzero(away == np.repeat(np.minimum.reduceat(away, starts), sizes))
+        best = nearer[np.searchsorted(nearer, starts)]  # of equal ones the first
         return (
-            np.take_along_axis(candidates, best[..., None], axis=1)[:, 0],
-            np.take_along_axis(weights, best[..., None], axis=1)[:, 0].astype(np.float32),
-            np.take_along_axis(away, best, axis=1)[:, 0],
+            self.mesh.triangles[candidate[best]],
+            weights[best].astype(np.float32),
+            np.sqrt(away[best]),
         )
 
 
-def _triangles_at(mesh: Mesh) -> NDArray[np.int64]:
-    """(V, AROUND) triangles at each vertex; where there are fewer, the first one again."""
+def _triangles_at(mesh: Mesh) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Triangles at the vertices, one vertex after the other, AROUND of each at most; and where each begins (V + 1,)."""
     vertex = mesh.triangles.ravel()
     triangle = np.repeat(np.arange(len(mesh.triangles)), 3)
     order = np.argsort(vertex, kind="stable")
     vertex, triangle = vertex[order], triangle[order]
     first = np.searchsorted(vertex, np.arange(len(mesh.vertices)))
-    which = np.arange(len(vertex)) - first[vertex]
-    table = np.repeat(triangle[first][:, None], AROUND, axis=1)
-    few = which < AROUND
-    table[vertex[few], which[few]] = triangle[few]
-    return table
+    few = np.arange(len(vertex)) - first[vertex] < AROUND
+    return triangle[few], np.searchsorted(vertex[few], np.arange(len(mesh.vertices) + 1))
 
 
-def _barycentric(corners: NDArray[np.float64], places: NDArray[np.floating]) -> NDArray[np.float64]:
-    """(…, 3) weights of corners (…, 3, 3) at the feet of places (…, 3), none below 0."""
-    a, b, c = (corners[..., k, :] for k in range(3))
-    u, v, w = b - a, c - a, places - a
-    uu, uv, vv, wu, wv = ((p * q).sum(axis=-1) for p, q in ((u, u), (u, v), (v, v), (w, u), (w, v)))
+def _shares(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(T, 2, 4): of triangles with corners (T, 3, 3), what makes of (x, y, z, 1) the shares of the second corner and of
+    the third at the foot of a place on their planes.
+    """
+    a, b, c = (corners[:, k] for k in range(3))
+    u, v = b - a, c - a
+    uu, uv, vv = (np.einsum("tc,tc->t", p, q)[:, None] for p, q in ((u, u), (u, v), (v, v)))
     size = uu * vv - uv**2
     flat = size <= 1e-12 * uu * vv
-    size = np.where(flat, 1, size)
-    second, third = (vv * wu - uv * wv) / size, (uu * wv - uv * wu) / size
-    weights = np.stack([1 - second - third, second, third], axis=-1)
+    rows = np.stack([vv * u - uv * v, uu * v - uv * u], axis=1) / np.where(flat, 1, size)[..., None]
     # A triangle that is a line is its first corner.
-    weights = np.where(flat[..., None], [1.0, 0.0, 0.0], np.maximum(weights, 0))
-    return np.asarray(weights / weights.sum(axis=-1, keepdims=True))
+    rows[flat[:, 0]] = 0
+    return np.concatenate([rows, -np.einsum("tkc,tc->tk", rows, a)[..., None]], axis=2)
+
+
+def _barycentric(shares: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(M, 3) weights of corners at the feet of places (M, 3), none below 0. shares: (M, 2, 4), of their triangles."""
+    later = np.einsum("mkc,mc->mk", shares[..., :3], places) + shares[..., 3]
+    weights = np.concatenate([1 - later.sum(axis=1, keepdims=True), later], axis=1)
+    np.maximum(weights, 0, out=weights)
+    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
