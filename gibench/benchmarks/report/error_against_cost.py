@@ -15,6 +15,7 @@ from gibench.benchmarks.report.figures import (
     cost_axis,
     error_axis,
     leader,
+    lowest_shown,
     new_figure,
     noise_band,
     short,
@@ -82,11 +83,16 @@ def error_against(
     if len(points) < 2 or not (points["cost"] > 0).any():
         return None
     higher = METRICS[metric].direction == "higher"
-    title = f"{metric_title(metric)} against {cost.title}"
+    title, about = f"{metric_title(metric)} against {cost.title}", _about(summary, track, part, machine)
+    logarithmic = not higher and bool((points["mean"] > 0).all())
+    # Those of two rooms are thirteen standard errors wide.
+    beyond = (points["low"] < lowest_shown(points["mean"])) & logarithmic
+    if beyond.any():
+        points.loc[beyond, ["low", "high"]] = math.nan
+        about += "  ·  those that leave the axis not drawn"
     for attempt in range(ATTEMPTS):
         figure, axes = new_figure(WIDTH, HEIGHT * 1.25**attempt)
-        write_title(figure, title, _about(summary, track, part, machine))
-        logarithmic = not higher and bool((points["mean"] > 0).all())
+        write_title(figure, title, about)
         error_axis(axes, points["low"], points["high"], points["mean"], points["floor"], logarithmic)
         nothing = cost_axis(axes, points["cost"])
         x = points["cost"].where(points["cost"] > 0, nothing)

@@ -69,6 +69,11 @@ def write_title(figure: Figure, title: str, about: str) -> None:
     figure.text(0.015, 1 - 0.29 / height, about, size=SMALL, color=FAINT, va="top")
 
 
+def lowest_shown(means: pd.Series) -> float:
+    """The smallest error that a logarithmic axis makes room for."""
+    return float(means.min()) / 10
+
+
 def error_axis(
     axes: Axes, lows: pd.Series, highs: pd.Series, means: pd.Series, floors: pd.Series, logarithmic: bool
 ) -> None:
@@ -76,7 +81,7 @@ def error_axis(
     floor = floors[np.isfinite(floors)]
     low, high = float(np.nanmin([*lows, *means])), float(np.nanmax([*highs, *means]))
     if logarithmic:
-        low = max(low, float(means.min()) / 10)
+        low = max(low, lowest_shown(means))
         # The floor is shown in its place unless that leaves the methods no room.
         if len(floor) and floor.mean() > 0 and floor.mean() > low / FARTHEST_FLOOR:
             low = min(low, float(floor.mean()) / 1.3)

@@ -66,3 +66,22 @@ def test_of_one_frame_in_one_room_there_is_no_interval(tmp_path):
         axes = error_against(summary, "walkthrough", "full", metric, TIME).axes[0]
         (low, high), means = axes.get_ylim(), summary.scores.loc[summary.scores["metric"] == metric, "mean"]
         assert low < means.min() <= means.max() < high < 2 * means.max()
+
+
+def test_an_interval_that_leaves_a_logarithmic_axis_is_not_drawn(tmp_path):
+    """One that reaches 0 has no end there; on an even axis it has, and is drawn."""
+    run = SyntheticRun(tmp_path, scenes=2, metrics=("rmse", "psnr"), parts=("full",))
+    summary = summarise(run)
+    summary.scores.loc[summary.scores.index[::2], "low"] = -1.0
+    for metric, told in (("rmse", True), ("psnr", False)):
+        figure = error_against(summary, "walkthrough", "full", metric, TIME)
+        drawn = [text for text, _ in boxes(figure) if text.endswith("those that leave the axis not drawn")]
+        assert bool(drawn) == told
+        ends = [
+            point[1]
+            for collection in figure.axes[0].collections
+            for segment in getattr(collection, "get_segments", list)()
+            for point in segment
+            if np.isfinite(point[1])
+        ]
+        assert (min(ends) > 0) == told
