@@ -66,7 +66,7 @@ class TrainingPlan:
 class WaveletTransport(RelightingLearner):
     """The network of a scene."""
 
-    rate: ClassVar[float] = 5e-3
+    rate: ClassVar[float] = 2e-3
 
     epsilon: ClassVar[float] = 1e-15
     """Features begin at 1e-4, and so do gradients (Müller et al. 2022, section 4)."""

@@ -26,7 +26,7 @@ LOGARITHM = MuLaw(mu=1.0)
 class RadianceTransfer(RelightingLearner):
     """The networks of a scene."""
 
-    rate: ClassVar[float] = 1e-3
+    rate: ClassVar[float] = 4e-4
     """The authors have 1e-4, and make many more steps."""
 
     network: TransferNetwork
