@@ -101,33 +101,25 @@ class Results:
         some = Results(self.folder, self.run, records)
         if group is None:
             return some
-        tags = {record["id"]: record.get("tags", []) for record in records}
+        tags = {str(record["config"]["scene"]): record.get("tags", []) for record in records}
         groups = sorted({tag for own in tags.values() for one in own for tag in one})
         if group not in groups:
             known = nearest(group, groups) if groups else "its frames are all of one"
             raise ResultsError(f"{self.root} has no group of frames '{group}'; {known}")
-        scene_tags = {str(record["config"]["scene"]): tags[record["id"]] for record in records}
-        sequences = {scene: {one[0] for one in own if group in one} for scene, own in scene_tags.items()}
-        frames, paths, floor = some.frames, some.sequences, some.floor
-        of = some.results.set_index("result")["scene"]
-        some.frames = frames[
-            [group in tags[id][number] for id, number in zip(frames["result"], frames["frame"], strict=True)]
-        ]
-        some.sequences = paths[
-            [name in sequences[of[id]] for id, name in zip(paths["result"], paths["sequence"], strict=True)]
-        ]
-        order = {
-            scene: list(dict.fromkeys(one[0] for one in own if one[0] != STILLS))
-            for scene, own in scene_tags.items()
-        }
-        some.floor = floor[
-            [
-                group in scene_tags[scene][number]
-                if number > WHOLE_PATH
-                else order[scene][WHOLE_PATH - number] in sequences[scene]
-                for scene, number in zip(floor["scene"], floor["frame"], strict=True)
-            ]
-        ]
+        # With their scene: frames, numbered as in `floor`, and sequences.
+        numbers: set[tuple[str, int]] = set()
+        names: set[tuple[str, str]] = set()
+        for scene, own in tags.items():
+            numbers |= {(scene, number) for number, one in enumerate(own) if group in one}
+            names |= {(scene, one[0]) for one in own if group in one}
+            sequences = dict.fromkeys(one[0] for one in own if one[0] != STILLS)
+            numbers |= {
+                (scene, WHOLE_PATH - order) for order, name in enumerate(sequences) if (scene, name) in names
+            }
+        scenes = some.results.set_index("result")["scene"]
+        some.frames = _kept(some.frames, some.frames["result"].map(scenes), "frame", numbers)
+        some.sequences = _kept(some.sequences, some.sequences["result"].map(scenes), "sequence", names)
+        some.floor = _kept(some.floor, some.floor["scene"], "frame", numbers)
         return some
 
     @cached_property
@@ -343,6 +335,11 @@ def load(root: str | Path) -> Results:
     folder = RunFolder(Path(root))
     run = folder.read_run()
     return Results(folder, run, [folder.read_result(id) for id in folder.ids()])
+
+
+def _kept(table: pd.DataFrame, scenes: pd.Series, column: str, kept: set[tuple[str, Any]]) -> pd.DataFrame:
+    """The rows whose scene and value of a column are among those that are kept."""
+    return table[[one in kept for one in zip(scenes, table[column], strict=True)]]
 
 
 def _metrics_in(scores: Mapping[str, Any]) -> set[str]:

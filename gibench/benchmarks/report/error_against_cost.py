@@ -12,6 +12,7 @@ import numpy as np
 from gibench.benchmarks.report.figures import (
     SMALL,
     WIDTH,
+    about_intervals,
     cost_axis,
     error_axis,
     leader,
@@ -19,6 +20,7 @@ from gibench.benchmarks.report.figures import (
     new_figure,
     noise_band,
     short,
+    without_longest,
     write_title,
 )
 from gibench.benchmarks.report.labels import Box, Label, needs_line, place
@@ -83,13 +85,11 @@ def error_against(
     if len(points) < 2 or not (points["cost"] > 0).any():
         return None
     higher = METRICS[metric].direction == "higher"
-    title, about = f"{metric_title(metric)} against {cost.title}", _about(summary, track, part, machine)
+    title = f"{metric_title(metric)} against {cost.title}"
     logarithmic = not higher and bool((points["mean"] > 0).all())
-    # Those of two rooms are thirteen standard errors wide.
-    beyond = (points["low"] < lowest_shown(points["mean"])) & logarithmic
-    if beyond.any():
-        points.loc[beyond, ["low", "high"]] = math.nan
-        about += "  ·  those that leave the axis not drawn"
+    lowest = lowest_shown(points["mean"], logarithmic)
+    about = _about(summary, track, part, machine) + about_intervals(points["low"], lowest)
+    points = without_longest(points, lowest)
     for attempt in range(ATTEMPTS):
         figure, axes = new_figure(WIDTH, HEIGHT * 1.25**attempt)
         write_title(figure, title, about)

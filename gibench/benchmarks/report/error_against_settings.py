@@ -11,13 +11,16 @@ import numpy as np
 
 from gibench.benchmarks.report.figures import (
     WIDTH,
+    about_intervals,
     end_labels,
     error_axis,
+    lowest_shown,
     new_figure,
     new_panel,
     noise_band,
     short,
     widest,
+    without_longest,
     write_title,
 )
 from gibench.benchmarks.report.plot_style import LINES, look, tick_text
@@ -96,7 +99,10 @@ def error_against_settings(
     height = top + rows * PANEL + (rows - 1) * gap + bottom
     figure, first = new_figure(WIDTH, height)
     first.remove()
+    lowest = lowest_shown(everything["mean"], logarithmic)
     about = f"{part_title(part)}  ·  track {short(track)}  ·  95 % intervals  ·  {short(machine)}"
+    about += about_intervals(everything["low"], lowest)
+    everything = without_longest(everything, lowest)
     write_title(figure, f"{metric_title(metric)} against settings", about)
     named = [short(name) for sweep in found if len(sweep.lines) > 1 for name in sweep.lines]
     beside = min(widest(figure, named) + 0.3, WIDTH / 4) if named else 0.1
@@ -124,7 +130,7 @@ def error_against_settings(
         style = look(methods.index(sweep.method))
         ends = []
         for (name, line), dashes in zip(sweep.lines.items(), LINES * len(sweep.lines), strict=False):
-            _line(axes, line, style, dashes)
+            _line(axes, without_longest(line, lowest), style, dashes)
             ends.append((short(name), float(line["mean"].iloc[-1]), style["color"]))
         if len(ends) > 1:
             end_labels(figure, axes, ends)

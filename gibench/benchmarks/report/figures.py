@@ -69,9 +69,23 @@ def write_title(figure: Figure, title: str, about: str) -> None:
     figure.text(0.015, 1 - 0.29 / height, about, size=SMALL, color=FAINT, va="top")
 
 
-def lowest_shown(means: pd.Series) -> float:
-    """The smallest error that a logarithmic axis makes room for."""
-    return float(means.min()) / 10
+def lowest_shown(means: pd.Series, logarithmic: bool) -> float:
+    """The smallest error that an axis makes room for."""
+    return float(means.min()) / 10 if logarithmic else -math.inf
+
+
+def without_longest(points: pd.DataFrame, lowest: float) -> pd.DataFrame:
+    """Points with `low` and `high` NaN where an interval begins below the smallest error that is shown.
+
+    On a logarithmic axis those of two rooms, thirteen standard errors wide, would cover everything else.
+    """
+    fits = points["low"] >= lowest
+    return points.assign(low=points["low"].where(fits), high=points["high"].where(fits))
+
+
+def about_intervals(lows: pd.Series, lowest: float) -> str:
+    """What the line below a title says of intervals that are left out; "" where none is."""
+    return "  ·  those that leave the axis not drawn" if (lows < lowest).any() else ""
 
 
 def error_axis(
@@ -81,7 +95,7 @@ def error_axis(
     floor = floors[np.isfinite(floors)]
     low, high = float(np.nanmin([*lows, *means])), float(np.nanmax([*highs, *means]))
     if logarithmic:
-        low = max(low, lowest_shown(means))
+        low = max(low, lowest_shown(means, logarithmic))
         # The floor is shown in its place unless that leaves the methods no room.
         if len(floor) and floor.mean() > 0 and floor.mean() > low / FARTHEST_FLOOR:
             low = min(low, float(floor.mean()) / 1.3)
