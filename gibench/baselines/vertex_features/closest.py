@@ -119,7 +119,7 @@ def _shares(corners: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _barycentric(shares: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
     """(M, 3) weights of corners at the feet of places (M, 3), none below 0. shares: (M, 2, 4), of their triangles."""
-    later = np.einsum("mkc,mc->mk", shares[..., :3], places) + shares[..., 3]
-    weights = np.concatenate([1 - later.sum(axis=1, keepdims=True), later], axis=1)
+    last_two = np.einsum("mkc,mc->mk", shares[..., :3], places) + shares[..., 3]
+    weights = np.concatenate([1 - last_two.sum(axis=1, keepdims=True), last_two], axis=1)
     np.maximum(weights, 0, out=weights)
     return np.asarray(weights / weights.sum(axis=1, keepdims=True))
