@@ -27,7 +27,7 @@ from gibench.benchmarks.report.plot_style import LINES, look, tick_text
 from gibench.benchmarks.report.runs import part_title
 from gibench.benchmarks.report.summary import Summary, is_number, knobs_of, label_without
 from gibench.benchmarks.report.wording import metric_title, printable
-from gibench.metrics import METRICS
+from gibench.metrics import METRICS, mean_interval
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -48,12 +48,14 @@ MOST_TICKS = 8
 class Sweep:
     """A method at LEAST values or more of one numeric knob, all else equal.
 
-    lines: rows of the settings with `value` of the knob, mean, low, high and floor, by what else is set.
+    lines: rows of the settings with `value` of the knob, mean, low, high and floor, by what else is set. named: whether
+    they need names, several or one that is not over all rooms.
     """
 
     method: str
     knob: str
     lines: dict[str, pd.DataFrame]
+    named: bool
 
     @property
     def values(self) -> list[float]:
@@ -68,6 +70,7 @@ def sweeps(summary: Summary, track: str, part: str, metric: str, machine: str) -
         knobs = [knobs_of(text) for text in own["knobs"]]
         for knob in dict.fromkeys(name for setting in knobs for name in setting):
             lines: dict[str, pd.DataFrame] = {}
+            fewer = False
             values = [_number(setting.get(knob)) for setting in knobs]
             others = [
                 json.dumps({k: v for k, v in setting.items() if k != knob}, sort_keys=True)
@@ -76,10 +79,43 @@ def sweeps(summary: Summary, track: str, part: str, metric: str, machine: str) -
             rows = own.assign(value=values, others=others).dropna(subset="value").sort_values("value")
             for _, line in rows.groupby("others", sort=False):
                 if line["value"].nunique() >= LEAST:
-                    lines[label_without(str(line["label"].iloc[0]), knob)] = line
+                    name = label_without(str(line["label"].iloc[0]), knob)
+                    shared, rooms = _in_shared_rooms(summary, line, part, metric)
+                    if shared is not line:
+                        name, fewer = f"{name} ({rooms} of {line['rooms'].max()} rooms)", True
+                    if rooms:
+                        lines[name] = shared
             if lines:
-                found.append(Sweep(str(method), knob, lines))
+                found.append(Sweep(str(method), knob, lines, fewer or len(lines) > 1))
     return found
+
+
+def _in_shared_rooms(
+    summary: Summary, line: pd.DataFrame, part: str, metric: str
+) -> tuple[pd.DataFrame, int]:
+    """The line over the rooms that all of its settings were measured in, and their number: another room is no setting.
+
+    Where all were measured in the same rooms it is the line itself. Else seeds are averaged before intervals are taken.
+    """
+    values, floor = (
+        table[(table["part"] == part) & (table["metric"] == metric)]
+        for table in (summary.values, summary.floor)
+    )
+    values = values[np.isfinite(values["value"])]
+    own = {entry: values[values["entry"] == entry] for entry in line.index}
+    rooms = [set(frames["scene"]) for frames in own.values()]
+    shared = set.intersection(*rooms)
+    if all(one == shared for one in rooms) or not shared:
+        return line, len(shared)
+    line = line.copy()
+    for entry, frames in own.items():
+        frames = frames[frames["scene"].isin(shared)]
+        found = mean_interval(frames["value"].to_numpy(), frames["scene"].to_numpy())
+        ends = np.array([found.low, found.high])
+        line.loc[entry, ["mean", "low", "high"]] = [found.mean, *np.where(np.isfinite(ends), ends, np.nan)]
+    noise = floor[floor["scene"].isin(shared) & np.isfinite(floor["value"])]
+    line["floor"] = noise.groupby("scene")["value"].mean().mean()
+    return line, len(shared)
 
 
 def error_against_settings(
@@ -104,7 +140,7 @@ def error_against_settings(
     about += about_intervals(everything["low"], lowest)
     everything = without_longest(everything, lowest)
     write_title(figure, f"{metric_title(metric)} against settings", about)
-    named = [short(name) for sweep in found if len(sweep.lines) > 1 for name in sweep.lines]
+    named = [short(name) for sweep in found if sweep.named for name in sweep.lines]
     beside = min(widest(figure, named) + 0.3, WIDTH / 4) if named else 0.1
     width = (WIDTH - left - between - 0.1) / COLUMNS
     methods = list(summary.entries["method"].unique())
@@ -132,7 +168,7 @@ def error_against_settings(
         for (name, line), dashes in zip(sweep.lines.items(), LINES * len(sweep.lines), strict=False):
             _line(axes, without_longest(line, lowest), style, dashes)
             ends.append((short(name), float(line["mean"].iloc[-1]), style["color"]))
-        if len(ends) > 1:
+        if sweep.named:
             end_labels(figure, axes, ends)
     return figure
 

@@ -39,6 +39,35 @@ def test_a_line_for_all_that_else_is_set(tmp_path):
         assert row.mean == scores.loc[scores["entry"] == entry, "mean"].item()
 
 
+def test_a_line_is_over_the_rooms_that_all_of_its_settings_have(tmp_path):
+    """A setting that was run in fewer rooms, or failed in one, would bend the line by the room and not by the knob."""
+    whole = summary_of(tmp_path, list(map(wavelets, (16, 64, 256))))
+    ((name,),) = (sweep.lines for sweep in found(whole))
+    assert name == "nfvr"
+    summary = summary_of(tmp_path, list(map(wavelets, (16, 64, 256))), failed=("nfvr wavelets=64",))
+    (sweep,) = found(summary)
+    ((name, line),) = sweep.lines.items()
+    assert name == "nfvr (2 of 3 rooms)"
+    assert sweep.named
+    values, floor = (
+        table[(table["part"] == "full") & (table["metric"] == "rmse") & (table["scene"] != "room-000002")]
+        for table in (summary.values, summary.floor)
+    )
+    for row in line.itertuples():
+        own = values.loc[values["entry"] == row.Index, "value"]
+        assert len(own) == 2
+        assert row.mean == pytest.approx(own.mean(), rel=1e-12)
+        assert row.low < row.mean < row.high
+        assert row.floor == pytest.approx(floor["value"].mean(), rel=1e-12)
+    texts = [
+        text
+        for text, _ in boxes(
+            error_against_settings(summary, "walkthrough", "full", "rmse", summary.machines[0])
+        )
+    ]
+    assert "nfvr (2 of 3 rooms)" in texts
+
+
 def test_two_values_or_truth_are_no_line(tmp_path):
     assert not found(summary_of(tmp_path, [wavelets(16), wavelets(64), Setting("isg")]))
     # Three values of which no two have all else alike.
