@@ -53,7 +53,9 @@ def frame_values(results: Results, name: str, part: str) -> pd.DataFrame:
     columns = ["result", "label", "method", "scene", "seed", "machine"]
     table = table.merge(results.results[columns], on="result").dropna(subset="value")
     if table.empty:
-        why = results.skipped.get(name, f"`gibench bench score {results.root}` computes it")
+        of_track = name in (*results.run["metrics"], *results.run["sequence_metrics"])
+        command = f"gibench bench score {results.root}" + ("" if of_track else f" --metrics {name}")
+        why = results.skipped.get(name, f"`{command}` computes it")
         raise ResultsError(f"{results.root} has no {name} of the {part} image: {why}")
     return table[["label", "method", "scene", "frame", "seed", "machine", "value"]]
 

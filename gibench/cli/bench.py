@@ -1,4 +1,4 @@
-"""`gibench bench run | list | score | compare | report`."""
+"""`gibench bench run | list | score | board | compare | report`."""
 
 from __future__ import annotations
 
@@ -71,11 +71,13 @@ def run_track(
     from gibench.benchmarks.equal_time import search
     from gibench.benchmarks.errors import RunError, TrackError
     from gibench.benchmarks.orders import Order, ordered_methods
+    from gibench.benchmarks.results import load
     from gibench.benchmarks.running import Run, run
     from gibench.benchmarks.scoring import Scored, score
     from gibench.benchmarks.settings import parse_overrides
     from gibench.benchmarks.track import load_track
     from gibench.cli import bench_printing as printing
+    from gibench.cli.bench_board import print_board
     from gibench.cli.dataset import check_variant, scene_options, scene_words
     from gibench.cli.progress import counting
 
@@ -148,7 +150,7 @@ def run_track(
     if equal_time is not None:
         printing.print_equal_time(root, equal_time)
     if not no_score:
-        printing.print_board(root)
+        print_board(load(root))
     if report.failed:
         raise RunError(
             f"{len(report.failed)} results failed, `gibench bench list {root}` says why; --retry-failed tries again"
@@ -204,6 +206,50 @@ def score_results(
         raise GibenchError(f"{len(scored.problems)} results could not be scored")
 
 
+OneRoom = Annotated[
+    str | None,
+    typer.Option(
+        help="One room alone, such as room-000000; intervals are over its frames.", show_default=False
+    ),
+]
+OneGroup = Annotated[
+    str | None,
+    typer.Option(help="One group of frames alone: stills, near, indoor, a sequence …", show_default=False),
+]
+
+
+@app.command("board")
+def board(
+    results: Folder,
+    metrics: Annotated[
+        str | None,
+        typer.Option(
+            help="Such as psnr,ssim; rows are sorted by the first.", show_default="the track's first"
+        ),
+    ] = None,
+    parts: Annotated[str, typer.Option(help="Such as full,indirect.")] = "full",
+    room: OneRoom = None,
+    group: OneGroup = None,
+    markdown: Annotated[bool, typer.Option("--markdown", help="A table to paste into a page.")] = False,
+) -> None:
+    """Print the leaderboard of a run, of all its frames or of some."""
+    from gibench.benchmarks.results import load
+    from gibench.cli.bench_board import print_board, print_columns
+    from gibench.cli.dataset import names_in
+    from gibench.metrics import metric
+
+    run = load(results)
+    names = run.run["metrics"][:1] if metrics is None else names_in(metrics, "--metrics")
+    for name in names:
+        metric(name)
+    of = [_known_part(part, "--parts") for part in names_in(parts, "--parts")]
+    some = run.among(room=room, group=group)
+    if markdown or len(names) > 1 or len(of) > 1:
+        print_columns(some, names, of, markdown=markdown)
+    else:
+        print_board(some, names[0], of[0])
+
+
 @app.command("compare")
 def compare(
     first: Annotated[str, typer.Argument(metavar="A", help="A folder, or with --in a method.")],
@@ -213,22 +259,10 @@ def compare(
     ] = None,
     metric: Annotated[str, typer.Option(help="Of two folders: the metric to compare by.")] = "rmse_display",
     part: Annotated[str, typer.Option(help="Of two folders: full, specular or indirect.")] = "full",
-    room: Annotated[
-        str | None,
-        typer.Option(
-            help="One room alone, such as room-000000; intervals are over its frames.", show_default=False
-        ),
-    ] = None,
-    group: Annotated[
-        str | None,
-        typer.Option(
-            help="One group of frames alone: stills, near, indoor, a sequence …", show_default=False
-        ),
-    ] = None,
+    room: OneRoom = None,
+    group: OneGroup = None,
 ) -> None:
     """Compare two runs, or two methods of one run, on the same frames."""
-    from gibench.benchmarks.errors import ResultsError
-    from gibench.benchmarks.report.source import PARTS
     from gibench.benchmarks.results import load
     from gibench.cli import bench_printing as printing
     from gibench.metrics import metric as descriptor
@@ -238,8 +272,7 @@ def compare(
         printing.print_methods_compared(load(within).among(room=room, group=group), first, second, where)
         return
     descriptor(metric)
-    if part not in PARTS:
-        raise ResultsError(f"--part: '{part}' is not allowed; allowed are {', '.join(PARTS)}")
+    _known_part(part, "--part")
     one, other = (load(folder).among(room=room, group=group) for folder in (first, second))
     printing.print_runs_compared(one, other, metric, part, where)
 
@@ -260,6 +293,15 @@ def report(
     from gibench.cli.bench_reporting import write_and_print
 
     write_and_print(results, out, archive)
+
+
+def _known_part(name: str, option: str) -> str:
+    from gibench.benchmarks.errors import ResultsError
+    from gibench.benchmarks.report.source import PARTS
+
+    if name not in PARTS:
+        raise ResultsError(f"{option}: '{name}' is not allowed; allowed are {', '.join(PARTS)}")
+    return name
 
 
 def _methods(names: str | None, track: str, preset: Preset) -> list[Found]:

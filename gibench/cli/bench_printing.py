@@ -15,7 +15,7 @@ from gibench.benchmarks.results import Results, load
 from gibench.benchmarks.running import Report, State
 from gibench.benchmarks.scoring import Scored
 from gibench.benchmarks.track import Preset, load_track, track_names
-from gibench.cli.output import one_line, say
+from gibench.cli.output import cut, one_line, say
 from gibench.cli.progress import QUIET_SECONDS, duration
 from gibench.errors import GibenchError
 
@@ -37,7 +37,7 @@ class RunPrinter:
             self._line(state.remark)
         elif record is not None:
             place = f"[{state.done:>{len(str(state.of))}}/{state.of}] {record['config']['scene']}"
-            self._line(f"{place} {_cut(record['label'], 32):<32} {_outcome(record)}")
+            self._line(f"{place} {cut(record['label'], 32):<32} {_outcome(record)}")
         elif (training := state.training) is not None:
             took = f"{duration(training['training'])}, with its views {duration(training['seconds'])}"
             self._line(f"trained on rooms: {training['method']} (seed {training['seed']}) {took}")
@@ -109,42 +109,13 @@ def print_equal_time(root: Path, milliseconds: float) -> None:
             _rows(f"≤ {milliseconds:g} ms", f"{met} (measured {tried.strip()})")
 
 
-def print_board(root: Path) -> None:
-    """Print the leaderboard of a run by its first metric."""
-    results = load(root)
-    if results.frames.empty:
-        return
-    name = results.run["metrics"][0]
-    board = statistics.leaderboard(results, name)
-    several = len(set(board["machine"])) > 1
-    say(f"\n{'method':<{LABEL}} {name:>9} {'95 % interval':>17} {'ms':>8} {'prepared':>10}")
-    for row in board.to_dict("records"):
-        if row["mean"] != row["mean"]:
-            say(f"{_cut(row['label'], LABEL):<{LABEL}}    failed in all {row['failed']} results")
-            continue
-        machine = f" {row['machine'][:6]}" if several else ""
-        say(
-            f"{_cut(row['label'], LABEL):<{LABEL}} {row['mean']:9.4f} {row['low']:8.4f} {row['high']:8.4f} "
-            f"{row['ms']:8.1f} {duration(row['prepare_s']):>10}{machine}"
-        )
-    if several:
-        say("Results of several machines: compare times within the rows of one machine alone.")
-    noise = statistics.floor(results, name, "full")
-    truly = name in results.unbiased
-    if noise == noise:
-        what = "(the references themselves)" if truly else "(noise of the references)"
-        say(f"{what:<{LABEL}} {noise:9.4f}")
-    if truly:
-        say(f"{name} is against the truth, by samples of the references that are not denoised.")
-
-
 def print_results(root: Path) -> None:
     """List the results of a run, failed ones with their reasons."""
     results = load(root)
     table = results.results
     for row in table.to_dict("records"):
         outcome = f"{row['ms_median']:8.1f} ms" if row["status"] == "ok" else f"failed {row['reason']}"
-        say(f"{row['scene']} {_cut(row['label'], LABEL):<{LABEL}} {outcome}")
+        say(f"{row['scene']} {cut(row['label'], LABEL):<{LABEL}} {outcome}")
     failed = int((table["status"] != "ok").sum())
     say(f"{len(table)} results, {failed} failed; tracebacks stand in {results.folder.results}")
 
@@ -254,11 +225,11 @@ def _compared(text: str, first: Results, one: str, second: Results, other: str, 
     try:
         difference = statistics.difference((first, one), (second, other), name, part)
     except ResultsError as problem:  # one has failed, or has no such part
-        say(f"{_cut(text, LABEL):<{LABEL}} {_cut(f'not compared: {problem}', 79 - LABEL)}")
+        say(f"{cut(text, LABEL):<{LABEL}} {cut(f'not compared: {problem}', 79 - LABEL)}")
         return
     interval = difference.interval
     say(
-        f"{_cut(text, LABEL):<{LABEL}} {interval.mean:+10.2g} {interval.low:+9.2g} {interval.high:+9.2g}  "
+        f"{cut(text, LABEL):<{LABEL}} {interval.mean:+10.2g} {interval.low:+9.2g} {interval.high:+9.2g}  "
         f"{difference.verdict}"
     )
 
@@ -272,19 +243,14 @@ def _times(first: Results, one: str, second: Results, other: str) -> None:
     shared = sorted(set(tables[0]["machine"]) & set(tables[1]["machine"]))
     name = one if one == other else "times"
     if not shared:
-        say(f"{_cut(name, LABEL):<{LABEL}} times not compared: they are of different machines")
+        say(f"{cut(name, LABEL):<{LABEL}} times not compared: they are of different machines")
     for machine in shared:
         ms = [table[table["machine"] == machine]["ms_median"].mean() for table in tables]
         prepare = [table[table["machine"] == machine]["prepare_s"].mean() for table in tables]
         say(
-            f"{_cut(name, LABEL):<{LABEL}} {ms[0]:.1f} and {ms[1]:.1f} ms, prepared in "
+            f"{cut(name, LABEL):<{LABEL}} {ms[0]:.1f} and {ms[1]:.1f} ms, prepared in "
             f"{duration(prepare[0])} and {duration(prepare[1])}"
         )
-
-
-def _cut(text: str, width: int) -> str:
-    text = one_line(text)
-    return text if len(text) <= width else text[: width - 1] + "…"
 
 
 def _row(name: str, value: str) -> None:

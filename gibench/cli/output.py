@@ -20,3 +20,9 @@ def harmless(text: str) -> str:
 def one_line(text: str) -> str:
     """The same for one line of a table: its breaks are spelt out too."""
     return harmless(text).replace("\n", "\\n").replace("\t", " ")
+
+
+def cut(text: str, width: int) -> str:
+    """The text on one line, its end left out where it is longer."""
+    text = one_line(text)
+    return text if len(text) <= width else text[: width - 1] + "…"

@@ -177,6 +177,39 @@ def test_from_a_run_to_comparisons(capsys, tmp_path, track, scenes_only):
     assert re.search(r"wrong nan +not compared: ", said)
     assert max(map(len, said.splitlines()[2:])) <= 80
 
+    assert run(app, ["bench", "board", str(scenes_only)]) == 0
+    said = capsys.readouterr().out.splitlines()
+    names = [line.split("  ")[0] for line in said[2:]]
+    assert names[: len(board) - 1] == board[:-1]
+    assert names[len(board) - 1] == "wrong nan"
+    assert max(map(len, said)) <= 80
+    columns = ["bench", "board", str(scenes_only), "--metrics", "psnr,rmse"]
+    assert run(app, columns) == 0
+    said = capsys.readouterr().out
+    assert max(map(len, said.splitlines())) <= 80
+    order = re.findall(r"^(constant|plain|wrong) .* (\S+) +(\S+) +(\S+)$", said, re.M)
+    assert order[-1] == ("wrong", "-", "-", "-")
+    assert len(order) == len(board)
+    psnr, rmse = ([float(row[column]) for row in order[:-1]] for column in (1, 2))
+    assert psnr == sorted(psnr, reverse=True)
+    assert all(0 < value < 1 for value in rmse)
+    assert run(app, [*columns, "--room", "room-000000", "--markdown"]) == 0
+    table = [line for line in capsys.readouterr().out.splitlines() if line.startswith("|")]
+    assert table[:2] == ["| method | psnr | rmse | ms |", "| --- | ---: | ---: | ---: |"]
+    assert len(table) == 2 + len(order)
+    assert "no metric is named 'rmsee'" in refused(capsys, "board", scenes_only, "--metrics", "psnr,rmsee")
+    assert f"score {scenes_only} --metrics flip` computes it" in refused(
+        capsys, "board", scenes_only, "--metrics", "flip"
+    )
+    assert (
+        run(app, ["bench", "board", str(scenes_only), "--metrics", "rmse", "--parts", "full,specular"]) == 0
+    )
+    said = capsys.readouterr().out
+    assert re.search(r"^full / specular$", said, re.M)
+    assert re.search(r"^plain shade=0\.5 +0\.\d+ / - +[\d.]+$", said, re.M)
+    assert "--parts: 'diffuse' is not allowed" in refused(capsys, "board", scenes_only, "--parts", "diffuse")
+    assert "no room 'kitchen'" in refused(capsys, "board", scenes_only, "--room", "kitchen")
+
     assert "'constant' has several settings" in refused(
         capsys, "compare", "--in", scenes_only, "constant", "plain", code=1
     )

@@ -51,7 +51,8 @@ def _read_run(root: Path) -> None:
     from gibench.benchmarks.report.tables import write_tables
     from gibench.benchmarks.result_files import RunFolder
     from gibench.benchmarks.results import load
-    from gibench.cli.bench_printing import print_board, print_results
+    from gibench.cli.bench_board import print_board, print_columns
+    from gibench.cli.bench_printing import print_results
 
     folder = RunFolder(root)
     with folder.claimed():
@@ -67,7 +68,9 @@ def _read_run(root: Path) -> None:
         write_tables(runs, summary, root)
         statistics.leaderboard(results, results.run["metrics"][0])
     print_results(root)
-    print_board(root)
+    print_board(results)
+    if not results.frames.empty:
+        print_columns(results, results.run["metrics"], ("full",))
     for id in folder.ids():
         if results.results.set_index("result")["status"].get(id) == "ok":
             results.prediction(id, 0)

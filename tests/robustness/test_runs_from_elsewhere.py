@@ -39,6 +39,7 @@ def commands(run: RunFolder, tmp_path):
     yield ["bench", "list", root]
     yield ["bench", "score", root]
     yield ["bench", "report", root, "--out", str(tmp_path / "board")]
+    yield ["bench", "board", root]
     yield ["bench", "compare", "constant", "plain", "--in", root]
 
 
