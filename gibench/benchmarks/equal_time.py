@@ -96,6 +96,8 @@ def _mean_of_medians(run: Run, jobs: list[Job]) -> float:
     """Milliseconds a frame: the median over the path, the mean over scenes; infinite where a result failed."""
     medians = []
     for job in jobs:
+        if not run.folder.result_file(job.id).exists():  # its training failed, which another record tells
+            return float("inf")
         record = run.folder.read_result(job.id)
         if record["status"] != "ok":
             return float("inf")

@@ -9,6 +9,7 @@ from typing import Any
 
 from PIL import Image
 
+from gibench.benchmarks.errors import ResultsError
 from gibench.benchmarks.results import Results, load
 from gibench.benchmarks.scenes import scene_name
 from gibench.datasets.files import write_whole
@@ -101,6 +102,10 @@ def _picture(name: str, dataset: Dataset) -> Image.Image:
 def _methods(results: Results) -> Image.Image:
     """The first frame of the first scene: its reference, and each method at its first setting."""
     records = [record for record in results.records() if record["status"] == "ok"]
+    if not records:
+        raise ResultsError(
+            f"{results.root} has no whole result: `gibench bench list {results.root}` says why"
+        )
     scene = scene_name(min(record["room"] for record in records))
     exposure = results.exposure(scene, 0)
     tiles = [(image_of(tone_map(results.reference(scene, 0), exposure)), "reference", "")]

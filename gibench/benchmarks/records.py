@@ -83,6 +83,7 @@ class Run(Checked):
     command: str
     equal_time: list[EqualTime]
     runs: list[dict[str, Any]]
+    asked: dict[Id, str] = Field(default_factory=dict)
     identity: dict[str, Any]
     base_settings: dict[str, dict[str, Setting]] = Field(default_factory=dict)
     machine: ThisMachine

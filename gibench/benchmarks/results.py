@@ -17,7 +17,7 @@ from gibench.benchmarks.costs import BOOKED
 from gibench.benchmarks.errors import ResultsError
 from gibench.benchmarks.references import reference_parts
 from gibench.benchmarks.result_files import RunFolder
-from gibench.benchmarks.scenes import STILLS, SceneFiles, scenes_in
+from gibench.benchmarks.scenes import SceneFiles, scenes_in
 from gibench.benchmarks.scoring import exposures_of, read_scores
 from gibench.datasets.errors import nearest
 
@@ -60,8 +60,9 @@ class Results:
     """The results of a run.
 
     root: their folder. run: what `run.json` says: track, preset, seed, machine (cpu, gpu, threads, cores, platform,
-    versions …), machines (by id), created, equal_time, runs. Where the same method, knobs, scene, seed and machine has
-    results of several versions of the code, the latest stands; `superseded` counts the others.
+    versions …), machines (by id), created, equal_time, asked, runs. Where the same label, scene, seed and machine has
+    several results, of versions of the code, of training times or of what the label leaves out, the one stands that was
+    made or asked for last; `superseded` counts the others.
 
     results: a row a result. Columns: result (id), track, scene, method, title, family, label (method and what sets it
     apart), knobs (JSON), seed, status ("ok" or "failed"), reason, frames, ms_median and ms_p95 (of a frame over the
@@ -73,11 +74,11 @@ class Results:
     def __init__(self, folder: RunFolder, run: dict[str, Any], records: list[dict[str, Any]]) -> None:
         """See `load`."""
         self.folder, self.root, self.run = folder, folder.root, run
+        asked = run.get("asked", {})
         newest: dict[tuple[Any, ...], dict[str, Any]] = {}
-        for record in sorted(records, key=lambda record: str(record["created"])):
+        for record in sorted(records, key=lambda r: max(str(r["created"]), asked.get(r["id"], ""))):
             config = record["config"]
-            what = (config["method"], json.dumps(config["knobs"], sort_keys=True), config["seed"])
-            newest[(config["scene"], *what, config["machine"])] = record
+            newest[config["scene"], record["label"], config["seed"], config["machine"]] = record
         self.superseded = len(records) - len(newest)
         self._records = {
             record["id"]: record
@@ -99,6 +100,7 @@ class Results:
                 raise ResultsError(f"{self.root} has no room '{room}'; {nearest(room, rooms)}")
             records = [record for record in records if record["config"]["scene"] == room]
         some = Results(self.folder, self.run, records)
+        some.superseded = self.superseded
         if group is None:
             return some
         tags = {str(record["config"]["scene"]): record.get("tags", []) for record in records}
@@ -112,15 +114,26 @@ class Results:
         for scene, own in tags.items():
             numbers |= {(scene, number) for number, one in enumerate(own) if group in one}
             names |= {(scene, one[0]) for one in own if group in one}
-            sequences = dict.fromkeys(one[0] for one in own if one[0] != STILLS)
+            sequences = (read_scores(self.folder, scene) or {}).get("sequences", {}).values()
+            scored = dict.fromkeys(name for by_sequence in sequences for name in by_sequence)
             numbers |= {
-                (scene, WHOLE_PATH - order) for order, name in enumerate(sequences) if (scene, name) in names
+                (scene, WHOLE_PATH - order) for order, name in enumerate(scored) if (scene, name) in names
             }
         scenes = some.results.set_index("result")["scene"]
         some.frames = _kept(some.frames, some.frames["result"].map(scenes), "frame", numbers)
         some.sequences = _kept(some.sequences, some.sequences["result"].map(scenes), "sequence", names)
         some.floor = _kept(some.floor, some.floor["scene"], "frame", numbers)
         return some
+
+    @cached_property
+    def mixed(self) -> list[str]:
+        """Labels whose results are not all of one version of the code, training time and setting of the knobs."""
+        found: dict[str, set[str]] = {}
+        for record in self._records.values():
+            config = record["config"]
+            facts = [config.get(name) for name in ("code", "training_seconds", "knobs")]
+            found.setdefault(record["label"], set()).add(json.dumps(facts, sort_keys=True))
+        return [label for label, several in found.items() if len(several) > 1]
 
     @cached_property
     def results(self) -> pd.DataFrame:
@@ -339,7 +352,7 @@ def load(root: str | Path) -> Results:
 
 def _kept(table: pd.DataFrame, scenes: pd.Series, column: str, kept: set[tuple[str, Any]]) -> pd.DataFrame:
     """The rows whose scene and value of a column are among those that are kept."""
-    return table[[one in kept for one in zip(scenes, table[column], strict=True)]]
+    return table[np.array([one in kept for one in zip(scenes, table[column], strict=True)], bool)]
 
 
 def _metrics_in(scores: Mapping[str, Any]) -> set[str]:

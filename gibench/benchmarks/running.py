@@ -173,7 +173,8 @@ class Run:
             "created": self.began.isoformat(timespec="seconds"),
             "equal_time": [],
             "runs": [],
-            **{key: value for key, value in self.run.items() if key in ("created", "equal_time", "runs")},
+            "asked": {},
+            **{k: value for k, value in self.run.items() if k in ("created", "equal_time", "runs", "asked")},
             "command": self.order.command,
             "identity": self._identity(),
             "base_settings": {**self.run.get("base_settings", {}), **plans},
@@ -276,7 +277,13 @@ class Run:
         return result
 
     def do(self, jobs: Sequence[Job]) -> None:
-        """Make the results that are not there. Raises RunError for a full disk."""
+        """Make the results that are not there. Raises RunError for a full disk.
+
+        All stand as asked for now, so that they come before results of other code that were made since.
+        """
+        began = self.began.isoformat(timespec="seconds")
+        self.run["asked"] |= {job.id: began for job in jobs}
+        self.keep_record(ended=False)
         waiting = [job for job in jobs if not self._is_there(job)]
         self.state.of += len(jobs)
         self.state.done += len(jobs) - len(waiting)

@@ -227,19 +227,20 @@ class _Unit:
         return read_scores(self.folder, name) or empty
 
     def missing(self) -> list[str]:
-        """Metrics that the file lacks and that can be computed, or whose reason to be skipped it does not give."""
+        """Metrics that the file lacks, or has from other code: neither values nor why there are none."""
         scores = self.read()
         known = {metric for part in scores["frames"].values() for metric in part}
         known |= {
             metric for part in scores["sequences"].values() for named in part.values() for metric in named
         }
-        codes = scores.get("codes", {})
-        return [
-            name
-            for name in self.names
-            if (name not in known or codes.get(name) != code_of(name))
-            and (name not in scores["skipped"] or name not in self.unusable)
-        ]
+        codes, skipped = scores.get("codes", {}), scores["skipped"]
+
+        def is_done(name: str) -> bool:
+            if name in skipped and name in self.unusable:
+                return True
+            return (name in known or name in skipped) and codes.get(name) == code_of(name)
+
+        return [name for name in self.names if not is_done(name)]
 
 
 def read_scores(folder: RunFolder, name: str) -> dict[str, Any] | None:
@@ -305,7 +306,7 @@ def _scored(unit: _Unit) -> _Outcome:
         "codes": {
             **scores.get("codes", {}),
             EXPOSURES: _exposure_code(),
-            **{n: code_of(n) for n in new["done"]},
+            **{name: code_of(name) for name in (*new["done"], *new["lasting"])},
         },
         "unbiased": sorted({*scores.get("unbiased", ())} - done | {*new["unbiased"]}),
         "clipped": of_before | new["clipped"],
@@ -368,7 +369,8 @@ def compute(
     frames: predictions; None for what the references themselves are wrong by. parts: that are scored.
 
     Returns "frames": part → metric → a value a frame; "sequences": part → name of the sequence → metric → the mean over
-    its steps, with "_prediction" and "_reference" beside (see `evaluate_sequence`); "skipped": metric → why; "done";
+    its steps, with "_prediction" and "_reference" beside (see `evaluate_sequence`); "skipped": metric → why; "lasting":
+    metrics that these frames can never have; "done";
     "unbiased": metrics that are against the truth in all parts; "clipped": of these, metric → how many values stand as
     0 for an estimate below it.
     """
@@ -379,6 +381,7 @@ def compute(
     values: dict[str, dict[str, list[float]]] = {}
     steps: dict[str, dict[str, dict[str, list[float]]]] = {}
     skipped: dict[str, str] = {}
+    lasting: set[str] = set()
     before: _Step | None = None
     for number in range(len(scene)):
         stretch = scene.stretch(number) if sequence else None
@@ -390,9 +393,12 @@ def compute(
             if part not in now.references or part not in parts:
                 continue
             if number == 0 and not values:
-                skipped |= _impossible(pred, image)
+                impossible, small = _impossible(pred, image)
+                skipped, lasting = skipped | impossible, lasting | small
             possible = [name for name in image if name not in skipped]
-            truly = [name for name in quadratic if name in possible and part in known]
+            truly = [
+                name for name in quadratic if name in possible and part in known and known[part].knows(name)
+            ]
             biased |= {name for name in image if name not in truly}
             against = [name for name in possible if name not in truly]
             row = metrics.evaluate(pred, now.references[part], metrics=against, exposure=exposure)
@@ -416,6 +422,7 @@ def compute(
         clipped[name] += together.clipped
     if not any(stretch.count > 1 for stretch in scene.sequences):
         skipped |= dict.fromkeys(sequence, "there is no sequence of two frames or more")
+        lasting |= set(sequence)
     return {
         "frames": values,
         "sequences": {
@@ -425,21 +432,25 @@ def compute(
             for part, named in steps.items()
         },
         "skipped": skipped,
+        "lasting": sorted(lasting),
         "done": [name for name in [*image, *sequence] if name not in skipped],
         "unbiased": [name for name in image if name not in biased],
         "clipped": {name: count for name, count in clipped.items() if count},
     }
 
 
-def _impossible(image: Image, names: Sequence[str]) -> dict[str, str]:
-    """Metrics that images of this size have no value of, and why."""
-    reasons = {}
+def _impossible(image: Image, names: Sequence[str]) -> tuple[dict[str, str], set[str]]:
+    """Metrics that images of this size have no value of here, and why; and which of them have none anywhere."""
+    reasons, small = {}, set()
     for name in names:
         try:
             metrics.evaluate(image, image, metrics=[name], exposure=1.0)
-        except (metrics.ImageTooSmallError, metrics.WeightsError, metrics.MissingDependencyError) as why:
+        except metrics.ImageTooSmallError as why:
             reasons[name] = str(why)
-    return reasons
+            small.add(name)
+        except (metrics.WeightsError, metrics.MissingDependencyError) as why:
+            reasons[name] = str(why)
+    return reasons, small
 
 
 class _Step:

@@ -126,6 +126,8 @@ def labels_of(results: Results, name: str) -> list[str]:
     if name in set(table["label"]):
         return [name]
     labels = list(dict.fromkeys(table[table["method"] == name]["label"]))
+    if table.empty:
+        raise ResultsError(f"{results.root} has no results yet: `{results.run['command']}` makes them")
     if not labels:
         known = sorted({*table["label"], *table["method"]})
         raise ResultsError(f"{results.root} has no method '{name}'; {nearest(name, known)}")

@@ -146,8 +146,9 @@ class _Session:
         os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
         from gibench.rendering import backend
 
-        backend.select_variant(task.variant)
-        backend.limit_threads(task.threads)
+        with turns.beside(task.turn):
+            backend.select_variant(task.variant)
+            backend.limit_threads(task.threads)
         if task.scene is None:
             self._train(started)
         else:
@@ -155,8 +156,8 @@ class _Session:
 
     def _train(self, started: float) -> None:
         """Train on rooms; whoever prepares for a scene finds the weights."""
-        views, cache = on_rooms(self.task)
         with turns.beside(self.task.turn):
+            views, cache = on_rooms(self.task)
             self.connection.send(("ready", time.perf_counter() - started))
             reset_peak()
             started = time.perf_counter()
@@ -185,6 +186,24 @@ class _SceneSession:
         self.rig: Any = None
 
     def run(self, started: float) -> None:
+        task = self.task
+        with turns.beside(task.turn):  # from loading on: somebody may be measuring
+            implementation = self._prepared(started)
+        for number, (settings, frames) in enumerate(task.settings):
+            if number:
+                adjust = getattr(implementation, "adjust", None)
+                if adjust is None:
+                    return
+                with turns.beside(task.turn):
+                    adjust(settings)
+            with turns.alone(task.turn, self._waits):
+                if task.turn is not None:
+                    self.connection.send(("alone", None))
+                result = self._rendered(implementation, frames)
+            self.connection.send(("result", result))
+
+    def _prepared(self, started: float) -> Any:
+        """Load renderer and scene, prepare the method, and tell what that took. Its implementation."""
         from gibench.rendering.scene import load_scene
 
         task, files = self.task, self.scene
@@ -219,36 +238,24 @@ class _SceneSession:
         implementation_class = task.method.load()
         # Read the sources that bakes are keyed by outside of the clock.
         digest(implementation_class.__module__)
-        with turns.beside(task.turn):
-            self.connection.send(("ready", time.perf_counter() - started))
+        self.connection.send(("ready", time.perf_counter() - started))
 
-            reset_peak()
-            synchronise()
-            started = time.perf_counter()
-            if task.method.trains:
-                room = files.room if task.rooms is None else None
-                weights = weights_of(task, caches[-1], views[-1], room)
-                site = replace(site, weights=weights.folder)
-            implementation = implementation_class(task.settings[0][0])
-            implementation.prepare(site)
-            synchronise()
-            wall = time.perf_counter() - started
-            used = [bake for cache in caches for bake in cache.used]
-            made = [bake for cache in caches for bake in cache.made]
-            prepared = preparation(wall, stages.seconds, used, made, views)
-            self.connection.send(("prepared", {**prepared, "peak_mb": peak_mb(), "gpu_mb": gpu_peak_mb()}))
-
-        for number, (settings, frames) in enumerate(task.settings):
-            if number:
-                adjust = getattr(implementation, "adjust", None)
-                if adjust is None:
-                    return
-                adjust(settings)
-            with turns.alone(task.turn, self._waits):
-                if task.turn is not None:
-                    self.connection.send(("alone", None))
-                result = self._rendered(implementation, frames)
-            self.connection.send(("result", result))
+        reset_peak()
+        synchronise()
+        started = time.perf_counter()
+        if task.method.trains:
+            room = files.room if task.rooms is None else None
+            weights = weights_of(task, caches[-1], views[-1], room)
+            site = replace(site, weights=weights.folder)
+        implementation = implementation_class(task.settings[0][0])
+        implementation.prepare(site)
+        synchronise()
+        wall = time.perf_counter() - started
+        used = [bake for cache in caches for bake in cache.used]
+        made = [bake for cache in caches for bake in cache.made]
+        prepared = preparation(wall, stages.seconds, used, made, views)
+        self.connection.send(("prepared", {**prepared, "peak_mb": peak_mb(), "gpu_mb": gpu_peak_mb()}))
+        return implementation
 
     def _waits(self) -> None:
         self.connection.send(("waits", None))

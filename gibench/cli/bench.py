@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -89,7 +90,7 @@ def run_track(
         ("--equal-time", equal_time),
         ("--training-seconds", training_seconds),
     ):
-        if value is not None and not value > 0:
+        if value is not None and not 0 < value < math.inf:
             raise TrackError(f"{option}: {value:g} is not allowed; allowed is a number above 0")
     if training_seconds is not None:
         chosen = chosen.with_training_seconds(preset, training_seconds)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gibench.benchmarks import statistics
 from gibench.benchmarks.results import Results
@@ -12,10 +13,11 @@ from gibench.cli.bench_printing import LABEL
 from gibench.cli.output import cut, one_line, say
 from gibench.cli.progress import duration
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 WIDTH = 80
 """Columns of a terminal."""
-
-SEVERAL = "Results of several machines: compare times within the rows of one alone."
 
 
 def print_board(results: Results, name: str | None = None, part: str = "full") -> None:
@@ -35,8 +37,7 @@ def print_board(results: Results, name: str | None = None, part: str = "full") -
             f"{cut(row['label'], LABEL):<{LABEL}} {row['mean']:9.4f} {row['low']:8.4f} {row['high']:8.4f} "
             f"{row['ms']:8.1f} {duration(row['prepare_s']):>10}{machine}"
         )
-    if several:
-        say(SEVERAL)
+    _remarks(results, board)
     noise = statistics.floor(results, name, part)
     truly = name in results.unbiased
     if math.isfinite(noise):
@@ -75,8 +76,31 @@ def print_columns(
             say(f"| {' | '.join(_escaped(text) for text in cell)} |")
     else:
         _say_in_tables(heads, rows)
-    if several:
-        say(SEVERAL)
+    _remarks(results, first)
+
+
+def _remarks(results: Results, board: pd.DataFrame) -> None:
+    """Say what rows must not be read without."""
+    if len(set(board["machine"])) > 1:
+        _wrapped("Results of several machines: compare times within the rows of one alone.")
+    most = board["rooms"].max()
+    for row in board[(board["rooms"] > 0) & (board["rooms"] < most)].to_dict("records"):
+        why = "others failed" if row["failed"] else "it was not run in the others"
+        _wrapped(f"{one_line(row['label'])} is over {row['rooms']} of {most} rooms: {why}.")
+    labels = set(board["label"])
+    for label in (label for label in results.mixed if label in labels):
+        _wrapped(mixed(label))
+
+
+def mixed(label: str) -> str:
+    """What there is to say of a row that several versions made; see `Results.mixed`."""
+    text = "has results of several versions of its code, knobs or training time: run its command again."
+    return f"{one_line(label)} {text}"
+
+
+def _wrapped(text: str) -> None:
+    for line in textwrap.wrap(text, WIDTH):
+        say(line)
 
 
 def _say_in_tables(heads: list[str], rows: list[list[str]]) -> None:

@@ -118,6 +118,10 @@ def print_results(root: Path) -> None:
         say(f"{row['scene']} {cut(row['label'], LABEL):<{LABEL}} {outcome}")
     failed = int((table["status"] != "ok").sum())
     say(f"{len(table)} results, {failed} failed; tracebacks stand in {results.folder.results}")
+    if results.superseded:
+        say(
+            f"{results.superseded} more are left out: of other code, knobs or training time, asked for before."
+        )
 
 
 def print_track(name: str) -> None:

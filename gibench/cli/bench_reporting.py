@@ -21,6 +21,7 @@ def write_and_print(results: Sequence[Path], out: Path | None, archive: Path | N
     from gibench.benchmarks.report import write_report
     from gibench.benchmarks.report.archive import pack, unpack
     from gibench.benchmarks.results import load
+    from gibench.cli.bench_board import mixed
 
     try:
         packed = next((path for path in results if path.is_file()), None)
@@ -35,6 +36,8 @@ def write_and_print(results: Sequence[Path], out: Path | None, archive: Path | N
             raise TrackError("name a folder with --out, or a file with --archive, or both")
         loaded = [load(folder) for folder in results]
         for one in loaded:
+            for label in one.mixed:
+                say(mixed(label), err=True)
             for record in one.records():
                 if record["status"] == "ok" and (changed := one.folder.changed_frame(record)):
                     file = one.folder.result_file(record["id"])

@@ -51,7 +51,8 @@ class Truth:
     """What is known of the true image, all (H, W, 3) linear radiance in Rec. 709 RGB.
 
     samples: two estimates without bias and with independent errors. halves: the same two denoised, each from its own
-    samples alone; of references that are not denoised the samples themselves. exposure: for display values.
+    samples alone; of references that are not denoised the samples themselves, which leaves fewer metrics that are
+    `known`. exposure: for display values.
 
     Raises DtypeError, ShapeError, NonFiniteError, RangeError for inputs that are not such images.
     """
@@ -76,6 +77,21 @@ class Truth:
     def reference(self) -> FloatArray:
         """The mean of the halves."""
         return 0.5 * (self.halves[0] + self.halves[1])
+
+    @cached_property
+    def _is_smooth(self) -> bool:
+        """Whether the reference has less noise than the samples: it was denoised, or there is none in black."""
+        same = all(np.array_equal(half, own) for half, own in zip(self.halves, self.samples, strict=True))
+        return not same or not self.reference.any()
+
+    def knows(self, name: str) -> bool:
+        """Whether a metric has no bias here: a mean of squares whose weights and tangents, which are taken at the
+        reference, do not follow the noise of the samples.
+        """
+        if not is_quadratic(name):
+            return False
+        descriptor = metric(name)
+        return self._is_smooth or (descriptor.values != "display" and descriptor.weight is None)
 
     def error(self, name: str, pred: FloatArray) -> Unbiased:
         """A quadratic metric of a prediction (H, W, 3), whose errors are independent of those of the samples.

@@ -64,6 +64,7 @@ def refused(capsys, *arguments, code: int = 2) -> str:
     ("arguments", "says"),
     [
         (["--track", "walkthru"], r"no track 'walkthru'; did you mean 'walkthrough'\?"),
+        (["--equal-time", "inf"], "--equal-time: inf is not allowed; allowed is a number above 0"),
         (["--preset", "smoky"], r"no preset 'smoky'; did you mean 'smoke'\?"),
         (["--methods", "constat"], r"no method 'constat'; did you mean 'constant'\?"),
         (["--methods", ","], r"--methods: ',' names nothing"),

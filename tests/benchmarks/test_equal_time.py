@@ -3,10 +3,12 @@ import math
 import pytest
 
 from gibench.benchmarks.equal_time import last_within, search
+from gibench.benchmarks.orders import Order, ordered_methods
 from gibench.benchmarks.result_files import RunFolder
 from gibench.benchmarks.running import run
 from tests.benchmarks import toys
 from tests.benchmarks.conftest import order
+from tests.benchmarks.test_training_on_rooms import track as on_rooms
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 6, 17])
@@ -57,3 +59,23 @@ def test_a_time_that_nothing_meets_is_recorded_too(scenes_only):
     assert entry["value"] is entry["label"] is entry["measured_ms"] is None
     assert entry["tried"]["0.03"] >= 30
     assert report.ids == ()
+
+
+def test_a_training_that_fails_fails_all_values(tmp_path):
+    """The first value that is tried records it; the others are not trained again, and have no record."""
+    failing = toys.found(
+        "Learner",
+        knobs=(toys.Knob("how", "failing", ("failing",), "trains", trains=True), toys.PAUSE),
+        channels=("color",),
+        trains=True,
+        budget="pause",
+    )
+    chosen = ordered_methods(on_rooms(), "tiny", [failing], {})
+    asked = Order(track=on_rooms(), preset="tiny", methods=chosen)
+    report = run(tmp_path / "run", asked, work=lambda doing: search(doing, 20.0))
+    (entry,) = RunFolder(tmp_path / "run").read_run()["equal_time"]
+    assert entry["value"] is None
+    assert len(entry["tried"]) > 1
+    assert set(entry["tried"].values()) == {None}
+    assert report.ids == ()
+    assert len(report.failed) == 1

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
+import pytest
 from PIL import Image
 
 from gibench.benchmarks import gallery
+from gibench.benchmarks.errors import ResultsError
 
 
 def test_every_picture_has_a_recipe_and_a_title():
@@ -24,3 +28,9 @@ def test_a_wide_picture_is_made_narrow_and_named_on_the_page(tmp_path):
     assert "[![Rooms.](rooms.jpg)](rooms.jpg)" in lines
     with Image.open(tmp_path / "rooms.jpg") as picture:
         assert picture.size == (gallery.WIDEST, 50)
+
+
+def test_a_run_without_a_whole_result_is_named(tmp_path):
+    run = SimpleNamespace(root=tmp_path, records=lambda: [{"status": "failed"}])
+    with pytest.raises(ResultsError, match="has no whole result: `gibench bench list"):
+        gallery._methods(run)

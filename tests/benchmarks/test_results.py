@@ -89,6 +89,43 @@ def test_the_latest_code_stands(copy):
     assert record["id"] not in set(again.results["result"])
 
 
+def another(folder, record, **changes):
+    """A result like one that is there, of another configuration. Its id."""
+    config = {**record["config"], **changes}
+    key = key_of(config)
+    made = {**record, "config": config, "key": key, "id": key[:16], "created": "2999-01-01T00:00:00+00:00"}
+    folder.result_file(key[:16]).write_text(json.dumps(made))
+    return key[:16]
+
+
+def test_what_was_asked_for_last_stands(copy):
+    """Code that is changed and changed back finds its results again, though others were made since."""
+    record = copy.read_result(copy.ids()[0])
+    newer = another(copy, record, code={**record["config"]["code"], "sources": "edited"})
+    assert newer in set(load(copy.root).results["result"])
+    copy.write_run(copy.read_run() | {"asked": {record["id"]: "2999-01-01T00:00:01+00:00"}})
+    again = load(copy.root)
+    assert record["id"] in set(again.results["result"])
+    assert again.superseded == 1
+
+
+def test_one_label_is_one_row_whatever_it_leaves_out(copy):
+    """A knob that came with a later version, or another base in the track's file, is not in the label."""
+    record = copy.read_result(copy.ids()[0])
+    newer = another(copy, record, knobs={**record["config"]["knobs"], "added": 1})
+    again = load(copy.root)
+    assert len(again.results) == 6
+    assert set(again.results["result"]) & {newer, record["id"]} == {newer}
+    assert again.mixed == []
+
+
+def test_rows_of_several_versions_are_named(copy, results):
+    assert results.mixed == []
+    record = copy.read_result(copy.ids()[0])
+    another(copy, record, scene="room-000001", code={**record["config"]["code"], "sources": "edited"})
+    assert load(copy.root).mixed == [record["label"]]
+
+
 @pytest.mark.parametrize("content", ["", "{", "[]", "{}", "null", '{"format": 1}'])
 def test_a_cut_off_result_is_named_with_what_to_do(copy, content):
     path = copy.result_file(copy.ids()[0])
@@ -169,3 +206,15 @@ def test_some_of_the_frames(copy, results):
         run.among(group="door")
     with pytest.raises(ResultsError, match="no group of frames 'near'"):
         results.among(group="near")
+
+
+def test_stills_of_a_run_without_sequences(copy):
+    for id in copy.ids():
+        path = copy.result_file(id)
+        path.write_text(json.dumps(json.loads(path.read_text()) | {"tags": [["stills"]] * 3}))
+        scores = json.loads(copy.score_file(id).read_text())
+        copy.score_file(id).write_text(json.dumps(scores | {"sequences": {}}))
+    some = load(copy.root).among(group="stills")
+    assert len(some.frames) > 0
+    assert list(some.sequences.columns) == ["result", "sequence", "metric", "part", "value"]
+    assert some.sequences.empty

@@ -164,9 +164,29 @@ def test_a_metric_that_cannot_be_computed_is_named_with_the_reason(copy, monkeyp
     assert "lpips_alex" in json.loads(copy.score_file(copy.ids()[0]).read_text())["skipped"]
 
 
+def test_what_these_frames_can_never_have_is_computed_once(copy, monkeypatch):
+    """A room without a sequence has no temporal metric, and scoring again must not read all of its frames for that."""
+    monkeypatch.setattr(scoring, "default_threads", lambda workers: 1)
+    plain = compute
+
+    def without(frames, scene, image, sequence, *more):
+        why = "there is no sequence of two frames or more"
+        found = plain(frames, scene, image, [], *more)
+        return found | {"skipped": dict.fromkeys(sequence, why), "lasting": list(sequence)}
+
+    monkeypatch.setattr(scoring, "compute", without)
+    assert score(copy, more=["mabd"]).skipped["mabd"][1] == 7
+    assert score(copy, more=["mabd"]).done == 0
+    path = copy.score_file(copy.ids()[0])
+    scores = json.loads(path.read_text())
+    path.write_text(json.dumps(scores | {"codes": scores["codes"] | {"mabd": "edited"}}))
+    assert score(copy, more=["mabd"]).done == 1
+
+
 def test_images_that_are_too_small_are_such_a_reason():
-    reasons = scoring._impossible(np.zeros((8, 20, 3), np.float32), ["rmse", "dssim", "flip"])
+    reasons, small = scoring._impossible(np.zeros((8, 20, 3), np.float32), ["rmse", "dssim", "flip"])
     assert list(reasons) == ["dssim"]
+    assert small == {"dssim"}
     assert "needs at least 11×11" in reasons["dssim"]
 
 

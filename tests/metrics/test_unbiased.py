@@ -116,6 +116,17 @@ def test_references_that_are_not_denoised_have_the_noise_of_their_mean(draws):
     assert floor == pytest.approx(0.25 * np.mean((first - second) ** 2, dtype=np.float64), rel=1e-6)
 
 
+def test_weights_and_tangents_that_follow_the_samples_are_not_known(draws):
+    """Of references that are not denoised only plain means of squares have no bias."""
+    first, second = draws[2][0].samples
+    raw = metrics.Truth((first, second), (first, second), EXPOSURE)
+    assert {name for name in QUADRATIC if raw.knows(name)} == {"mse", "rmse"}
+    assert all(draws[2][0].knows(name) for name in QUADRATIC)
+    assert not draws[2][0].knows("mae")
+    black = (np.zeros_like(first),) * 2
+    assert all(metrics.Truth(black, black, EXPOSURE).knows(name) for name in QUADRATIC)
+
+
 def test_an_estimate_below_zero_is_zero_and_says_so(draws):
     image = draws[0]
     around = np.float32(0.5) * image

@@ -19,6 +19,9 @@ from gibench.baselines.training.precision import mixed
 STEPS = 500_000
 """Where no time is set."""
 
+TINT = 0.5
+"""Spread of the logarithms of the gains that a frame's colours are turned up and down by."""
+
 LOGARITHM = MuLaw(mu=1.0)
 """log(1 + x) / log 2, continued to negative numbers."""
 
@@ -39,14 +42,23 @@ class RadianceTransfer(RelightingLearner):
         super().__init__(network, examples, apart, seed)
 
     def draw(self, example: tuple[Seen, Light], random: np.random.Generator) -> Example:
-        """Any pixels. A frame that sees no surface gives pixels that are black in truth, without light."""
+        """Any pixels, under light of another tint. A frame that sees no surface gives pixels that are black in truth,
+        without light.
+
+        Light transport keeps the three colours apart, so red light twice as bright is twice as bright a red. The
+        encoder is not told that, and of a few hundred environments, most of them warm, learns one cast for all.
+        """
         seen, picture = example
+        tint = np.exp(TINT * random.standard_normal(3)).astype(np.float32)
+        tint /= tint.mean()
+        picture = picture * tint[:, None, None]
         if not len(seen.points):
             seen = Seen(*(torch.zeros(1, *part.shape[1:]) for part in seen))
             picture = np.zeros_like(picture)
-        return example_of(
+        found = example_of(
             seen, picture, torch.from_numpy(random.integers(len(seen.points), size=self.pixels))
         )
+        return found._replace(truth=found.truth * torch.from_numpy(tint))
 
     def judged(self, example: tuple[Seen, Light]) -> Example:
         """Pixels all over the frame."""

@@ -40,10 +40,15 @@ class RelightingLearner(Learner):
     epsilon: ClassVar[float] = 1e-8
     """Of Adam."""
 
+    momenta: ClassVar[tuple[float, float]] = (0.9, 0.999)
+    """Of Adam, β₁ and β₂."""
+
     def __init__(self, network: nn.Module, examples: Drawn, apart: Examples, seed: int) -> None:
         """network: on its device. examples: what `draw` is given. apart: what is held out."""
         self.examples, self.network, self.seed = examples, network, seed
-        optimiser = torch.optim.Adam(network.parameters(), lr=self.rate, eps=self.epsilon, fused=True)
+        optimiser = torch.optim.Adam(
+            network.parameters(), lr=self.rate, betas=self.momenta, eps=self.epsilon, fused=True
+        )
         super().__init__({"network": network}, {"network": optimiser})
         # Read once, and before any clock says what a look takes.
         found = [self.judged(apart[index]) for index in range(len(apart))]

@@ -21,8 +21,7 @@ class WaveletLight(NamedTuple):
     """Some wavelets and how much of each there is.
 
     places: (K,) of the coefficients (6, S, S) in flat order, int64. weights: (K, 3), W·m⁻², linear Rec. 709, signed:
-    the coefficient times the integral of its wavelet's magnitude, so that light of one radiance weighs the same in the
-    coarsest wavelets as in all of the finest ones together.
+    the coefficient times `scales`.
     """
 
     places: NDArray[np.int64]
@@ -35,17 +34,21 @@ def coefficients_of(environment: EnvironmentMap, faces: int) -> NDArray[np.float
     return haar(to_cubemap(pixels, faces).astype(np.float64))
 
 
-def magnitudes(faces: int) -> NDArray[np.float64]:
-    """(faces, faces) integral over the sphere of the magnitude of each wavelet, sr, on texels of equal solid angle.
+def scales(faces: int) -> NDArray[np.float64]:
+    """(faces, faces) by which coefficients are multiplied, sr, on texels of equal solid angle.
 
-    A wavelet on A texels is ±1/√A there.
+    A wavelet on A texels is ±1/√A there, so light of one radiance in it is √A. What reflects it changes little over a
+    small support: of a smooth function the differences that a wavelet takes fall with the side of its support, by √A
+    again. Times A, over the side of a face so that the coarsest have the integral of their magnitude, smooth transport
+    answers to all levels with numbers of one size; and what a network was hardly ever asked about, and answers at
+    random, weighs no more than it can be worth.
     """
-    return np.sqrt(supports(faces)) * (4 * np.pi / (6 * faces**2))
+    return supports(faces) / faces * (4 * np.pi / (6 * faces**2))
 
 
 def weights_of(coefficients: NDArray[np.float64], places: NDArray[np.int64]) -> NDArray[np.float64]:
     """(K, 3) weights of some of the coefficients (6, S, S, 3), as `WaveletLight` has them."""
-    size = magnitudes(coefficients.shape[1]).ravel()
+    size = scales(coefficients.shape[1]).ravel()
     return coefficients.reshape(-1, coefficients.shape[-1])[places] * size[places % size.size, None]
 
 

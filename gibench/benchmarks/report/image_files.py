@@ -75,8 +75,8 @@ def pack(codes: NDArray[Any]) -> str:
     return base64.b64encode(zlib.compress(content, 6)).decode()
 
 
-def write_images(source: ReportSource, results: pd.DataFrame, out: Path) -> int:
-    """Write every scored image, its reference and its FLIP map below `out`; give the bytes that they take.
+def write_images(source: ReportSource, results: pd.DataFrame, out: Path) -> list[Path]:
+    """Write every scored image, its reference and its FLIP map below `out`; give their paths.
 
     results: those that are done, with columns result and scene. Files are named as `image_name` says.
     """
@@ -84,20 +84,22 @@ def write_images(source: ReportSource, results: pd.DataFrame, out: Path) -> int:
     done = done[done["part"] == done["part"].map(image_part)]
     jobs = done.merge(results[["result", "scene"]], on="result").groupby(["scene", "frame", "part"])["result"]
 
-    def write(job: tuple[Any, Any]) -> int:
+    def write(job: tuple[Any, Any]) -> list[Path]:
         (scene, frame, part), predictions = job
         exposure = source.exposure(scene, int(frame))
         reference = source.reference(scene, int(frame), part)
         seen = tone_map(reference, exposure)
-        total = _write(out, image_name("images", scene, frame, part), encode(reference * exposure))
+        written = [_write(out, image_name("images", scene, frame, part), encode(reference * exposure))]
         for result in predictions:
             image = source.prediction(result, int(frame), part)
             error = np.rint(255 * np.asarray(flip(tone_map(image, exposure), seen, map=True)))
-            total += _write(out, image_name("images", result, frame, part), encode(image * exposure))
-            total += _write(out, image_name("errors", result, frame, part), error[..., None])
-        return total
+            written += [
+                _write(out, image_name("images", result, frame, part), encode(image * exposure)),
+                _write(out, image_name("errors", result, frame, part), error[..., None]),
+            ]
+        return written
 
-    return sum(_in_threads(write, list(jobs)))
+    return [path for written in _in_threads(write, list(jobs)) for path in written]
 
 
 def image_name(kind: str, of: str, frame: int, part: str) -> str:
@@ -105,7 +107,7 @@ def image_name(kind: str, of: str, frame: int, part: str) -> str:
     return f"{kind}/{of}/{int(frame):04d}-{part}.js"
 
 
-def _write(out: Path, name: str, codes: NDArray[Any]) -> int:
+def _write(out: Path, name: str, codes: NDArray[Any]) -> Path:
     height, width, channels = codes.shape
     path = out / name
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -118,10 +120,10 @@ def _write(out: Path, name: str, codes: NDArray[Any]) -> int:
     except OSError:
         beside.unlink(missing_ok=True)
         raise
-    return len(text)
+    return path
 
 
-def _in_threads(work: Callable[[Any], int], jobs: list[Any]) -> list[int]:
+def _in_threads(work: Callable[[Any], list[Path]], jobs: list[Any]) -> list[list[Path]]:
     # NumPy and zlib let other threads run while they compute.
     with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
         futures = [pool.submit(work, job) for job in jobs]

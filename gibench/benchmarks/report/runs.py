@@ -41,7 +41,9 @@ class Runs:
     """A `ReportSource` of one run or more."""
 
     def __init__(self, runs: Sequence[Results]) -> None:
-        """Raises ReportError for none, and for two runs of one track with scenes of one name but another content."""
+        """Raises ReportError for none, and for two runs of one track that have scenes of one name but another content,
+        or one setting of a method with other results.
+        """
         if not runs:
             raise ReportError("name the folder of a run, or several")
         self._runs = list(runs)
@@ -49,6 +51,7 @@ class Runs:
         self._place: dict[str, tuple[Results, str]] = {}
         self._names: dict[tuple[int, str], str] = {}
         content: dict[str, str] = {}
+        settings: dict[tuple[Any, ...], tuple[str, Results]] = {}
         for number, run in enumerate(self._runs):
             for record in run.records():
                 own, config = str(record["config"]["scene"]), record["config"]
@@ -57,6 +60,13 @@ class Runs:
                     raise ReportError(
                         f"{run.root} and {self._place[name][0].root} are both of {config['track']}, but their {own} "
                         "is not the same scene: report them apart"
+                    )
+                what = (name, record["label"], config["seed"], config["machine"])
+                id, other = settings.setdefault(what, (record["id"], run))
+                if id != record["id"]:
+                    raise ReportError(
+                        f"{other.root} and {run.root} both have '{record['label']}' in {own}, of other code, knobs or "
+                        "training: report them apart, or compare them with `gibench bench compare`"
                     )
                 self._place.setdefault(name, (run, own))
                 self._names[number, own] = name
@@ -196,15 +206,23 @@ class Runs:
         )
 
     def _tags(self) -> pd.DataFrame:
-        """Result, frame and group, for results whose frames are not all of the same groups."""
+        """Result, frame and group, for tracks whose frames are not all of the same groups."""
         import pandas as pd
 
-        rows = []
+        of: dict[str, list[dict[str, Any]]] = {}
         for run in self._runs:
             for record in run.records():
-                tags = record.get("tags", [])
-                if len({tuple(one) for one in tags}) > 1:
-                    rows += [(record["id"], frame, tag) for frame, own in enumerate(tags) for tag in own]
+                of.setdefault(record["config"]["track"], []).append(record)
+        rows = []
+        for records in of.values():
+            # Of the whole track: a room may have stills alone beside rooms with paths.
+            if len({tuple(one) for record in records for one in record.get("tags", [])}) > 1:
+                rows += [
+                    (record["id"], frame, tag)
+                    for record in records
+                    for frame, own in enumerate(record.get("tags", []))
+                    for tag in own
+                ]
         return pd.DataFrame(rows, columns=["result", "frame", "tag"]).drop_duplicates()
 
 

@@ -29,7 +29,8 @@ class Summary:
     """A run by setting.
 
     entries: a row a setting (track, label, machine), indexed by its number; columns method, title, family, knobs,
-    curve, rooms and failed_rooms (how many), seeds, `COSTS` (means over rooms) and peak_mb (the largest).
+    curve, rooms (how many have results of all seeds) and failed_rooms (how many lack one that failed), seeds, `COSTS`
+    (means over rooms) and peak_mb (the largest).
     results: the run's results with their `entry`.
     values: metric by entry, scene, frame, part, seeds averaged; frame is -1 for metrics in time.
     scores: a row by entry, part and metric: mean, low and high (95 %, over rooms and seeds), rooms, frames, left_out
@@ -188,8 +189,11 @@ def _entries(results: pd.DataFrame) -> pd.DataFrame:
     for _, group in results.groupby("entry", sort=True):
         first, done = group.iloc[0], group[group["status"] == "ok"]
         row = {name: first[name] for name in [*ENTRY, "method", "title", "family", "knobs"]}
-        row["rooms"] = done["scene"].nunique()
-        row["failed_rooms"] = group.loc[group["status"] != "ok", "scene"].nunique()
+        # Means are over frames that all seeds have.
+        whole = done.groupby("scene")["seed"].nunique() == group["seed"].nunique()
+        rooms = set(whole.index[whole])
+        row["rooms"] = len(rooms)
+        row["failed_rooms"] = len(set(group.loc[group["status"] != "ok", "scene"]) - rooms)
         row["seeds"] = done["seed"].nunique()
         for name in COSTS:
             # Every room weighs the same, however many seeds it has.

@@ -115,7 +115,7 @@ def errors(summary: Summary, track: str, part: str) -> Table:
     metrics = summary.metrics(part)
     scores = summary.scores[summary.scores["part"] == part].set_index(["entry", "metric"])
     entries = _of_track(summary, track, part)
-    whole = _in_most_rooms(summary, entries)
+    whole = _in_most_rooms(scores, entries)
     best = {metric: _best(metric, [_score(scores, e, metric, "mean") for e in whole]) for metric in metrics}
     rows = []
     for entry in entries:
@@ -236,9 +236,9 @@ def _of_track(summary: Summary, track: str, part: str) -> list[Any]:
     return [entry for entry in of if entry in scored]
 
 
-def _in_most_rooms(summary: Summary, entries: Sequence[Any]) -> list[Any]:
+def _in_most_rooms(scores: pd.DataFrame, entries: Sequence[Any]) -> list[Any]:
     # A mean over fewer rooms, the hard ones failed, is no better than the others.
-    rooms = summary.entries.loc[list(entries), "rooms"]
+    rooms = scores["rooms"].groupby("entry").max()
     return [entry for entry in entries if rooms[entry] == rooms.max()]
 
 

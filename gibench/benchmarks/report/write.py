@@ -43,10 +43,31 @@ def write_report(
     elif isinstance(results, Sequence):
         results = Runs(results)
     summary = summarise(results, against=against)
+    again = (out / "index.html").is_file()
     for folder in (out, out / "tables", out / "plots"):
         folder.mkdir(parents=True, exist_ok=True)
-    write_csv_files(results, summary, out)
-    write_tables(results, summary, out / "tables")
-    write_plots(results, summary, out / "plots")
-    write_images(results, summary.results[summary.results["status"] == "ok"], out)
-    return write_page(results, summary, out)
+    written = {
+        *write_csv_files(results, summary, out),
+        *write_tables(results, summary, out / "tables"),
+        *write_plots(results, summary, out / "plots"),
+        *write_images(results, summary.results[summary.results["status"] == "ok"], out),
+    }
+    page = write_page(results, summary, out)
+    if again:
+        _remove_older(out, written)
+    return page
+
+
+OWN = ("tables/*.md", "tables/*.tex", "plots/*.svg", "plots/*.png", "images/*/*.js", "errors/*/*.js")
+"""Files of a report beside its page, by which those of an older one in the same folder are known."""
+
+
+def _remove_older(out: Path, written: set[Path]) -> None:
+    """Remove what a report of before left that this one does not have: a table of what failed then, say."""
+    for pattern in OWN:
+        for path in out.glob(pattern):
+            if path not in written and not path.is_symlink():
+                path.unlink()
+    for folder in (*out.glob("images/*"), *out.glob("errors/*")):
+        if folder.is_dir() and not any(folder.iterdir()):
+            folder.rmdir()

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gibench.baselines.wavelets.haar import haar, inverse_haar
+from gibench.baselines.wavelets.haar import haar, inverse_haar, supports
 from gibench.baselines.wavelets.light import (
     chosen_light,
     coefficients_of,
     light_at,
-    magnitudes,
+    scales,
     weights_of,
 )
 from gibench.rendering.lighting import EnvironmentMap
@@ -26,10 +26,12 @@ def noise(height=32, seed=0):
 
 
 @pytest.mark.parametrize("size", [2, 16])
-def test_a_weight_is_the_integral_of_what_its_wavelet_gives(size):
+def test_a_weight_is_the_integral_of_what_its_wavelet_gives_times_the_side_of_its_support(size):
     one = np.eye(size * size).reshape(size * size, size, size, 1)
-    integrals = np.abs(inverse_haar(one)).sum(axis=(1, 2, 3)) * 4 * np.pi / (6 * size**2)
-    np.testing.assert_allclose(magnitudes(size).ravel(), integrals)
+    pictures = inverse_haar(one)
+    integrals = np.abs(pictures).sum(axis=(1, 2, 3)) * 4 * np.pi / (6 * size**2)
+    sides = np.sqrt((pictures != 0).sum(axis=(1, 2, 3)))
+    np.testing.assert_allclose(scales(size).ravel(), integrals * sides / size)
     # Of a constant, the sums alone weigh anything: together 4π times its radiance.
     weights = weights_of(haar(np.full((6, size, size, 3), 0.5)), np.arange(6 * size**2))
     np.testing.assert_allclose(weights.sum(axis=0), 0.5 * 4 * np.pi)
@@ -103,3 +105,17 @@ def test_whole_turns_change_nothing():
 def test_more_wavelets_than_there_are():
     light = chosen_light(coefficients_of(environment(noise()), 2), 64, "area")
     assert len(light.places) == 24
+
+
+def test_smooth_transport_answers_to_all_levels_with_numbers_of_one_size():
+    """Else what was never learned, and is of the size of the coarsest answers, would be noise in the fine ones."""
+    size = 32
+    across = (np.arange(size) + 0.5) / size
+    smooth = np.sin(3 * across[:, None] + 2 * across[None, :])[None, ..., None]
+    answers = np.abs(haar(np.repeat(smooth, 6, axis=0))[0, ..., 0]) / (scales(size) * size**3)
+    level = np.floor(np.log2(np.maximum(np.arange(size)[:, None], np.arange(size)[None, :]).clip(1)))
+    typical = np.array([np.median(answers[level == own]) for own in range(5)])
+    assert typical.max() < 2 * typical.min()
+    # By the integral of their magnitude alone they fall sixteen times.
+    plain = np.array([np.median((answers * np.sqrt(supports(size)))[level == own]) for own in range(5)])
+    assert plain[0] > 8 * plain[-1]

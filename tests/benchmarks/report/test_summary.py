@@ -112,6 +112,24 @@ def test_seeds_are_averaged_frame_by_frame(run):
     assert twice.entries.set_index("label").loc["rtrt", "seeds"] == 2
 
 
+def test_a_room_where_one_seed_failed_or_was_not_run_is_no_part_of_a_mean(run):
+    twice = SyntheticRun(run.root, frames=3)
+    first, values = twice.results, twice.frames
+    second = first.assign(seed=2, result="b" + first["result"])
+    lost = (second["label"] == "ulr") & (second["scene"] == "room-000001")
+    second.loc[lost, ["status", "reason"]] = ["failed", "no"]
+    second = second[(second["label"] != "isg") | (second["scene"] == "room-000000")]
+    twice.results = pd.concat([first, second], ignore_index=True)
+    again = values.assign(result="b" + values["result"])
+    there = set(second.loc[second["status"] == "ok", "result"])
+    twice.frames = pd.concat([values, again[again["result"].isin(there)]], ignore_index=True)
+    twice = summarise(twice)
+    rows = twice.entries.set_index("label")
+    for label, rooms, failed_rooms in (("ulr", 2, 1), ("isg", 1, 0), ("rtrt", 3, 0)):
+        assert (rows.loc[label, "rooms"], rows.loc[label, "failed_rooms"]) == (rooms, failed_rooms)
+        assert score(twice, label)["rooms"] == rooms
+
+
 def test_machines_have_rows_of_their_own(run):
     summary = summarise(SyntheticRun(run.root, frames=2, scenes=2, machines=("aaaaaaaa", "bbbbbbbb")))
     assert len(summary.machines) == 2

@@ -45,3 +45,27 @@ def test_importing_the_report_is_light():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
     assert done.stdout.strip() == "[]", done.stderr
+
+
+def test_what_a_report_of_before_left_is_gone(tmp_path):
+    chosen = settings()[:3]
+    failing = SyntheticRun(tmp_path, chosen=chosen, scenes=2, frames=1, metrics=("rmse",), failed=("ulr",))
+    out = tmp_path / "report"
+    out.mkdir()
+    (out / "tables").mkdir()
+    mine = out / "tables" / "mine.md"
+    mine.write_text("of somebody who chose this folder")
+    write_report(failing, out)
+    assert mine.exists()
+    assert (out / "tables/failed.md").exists()
+    fewer = SyntheticRun(tmp_path, chosen=chosen[:1], scenes=1, frames=1, metrics=("rmse",), parts=("full",))
+    write_report(fewer, out)
+    written = {path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file()}
+    write_report(fewer, tmp_path / "new")
+    new = {
+        path.relative_to(tmp_path / "new").as_posix()
+        for path in (tmp_path / "new").rglob("*")
+        if path.is_file()
+    }
+    assert written == new
+    assert not list(out.glob("images/*/")) or len(list(out.glob("images/*"))) == 2

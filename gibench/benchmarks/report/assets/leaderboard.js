@@ -88,7 +88,6 @@ function showBoard() {
 }
 
 function boardRow(row, best) {
-  const rooms = row.entry.rooms + row.entry.failed_rooms;
   const cells = columns().map(({ key: name }) => {
     switch (name) {
       case "label": return make("th", { scope: "row", title: row.entry.title }, mark(row.entry), row.label);
@@ -102,8 +101,9 @@ function boardRow(row, best) {
       case "prepare": return make("td", {}, seconds(row.prepare));
       case "bytes": return make("td", {}, bytes(row.bytes));
       case "peak": return make("td", {}, bytes(finite(row.peak) ? row.peak * 1e6 : null));
-      case "rooms": return make("td", {}, state.scene !== "" ? String(row.rooms)
-        : row.entry.failed_rooms ? make("a", { href: "#failed", title: "It failed in the others" }, `${row.entry.rooms} of ${rooms}`) : String(rooms));
+      case "rooms": return make("td", {}, state.scene === "" && row.entry.failed_rooms
+        ? make("a", { href: "#failed", title: "It failed in the others" }, `${row.rooms} of ${row.rooms + row.entry.failed_rooms}`)
+        : String(row.rooms));
       case "family": return make("td", { class: "words small" }, row.family);
     }
   });
