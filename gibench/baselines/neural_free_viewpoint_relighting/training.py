@@ -71,6 +71,9 @@ class WaveletTransport(RelightingLearner):
     epsilon: ClassVar[float] = 1e-15
     """Features begin at 1e-4, and so do gradients (Müller et al. 2022, section 4)."""
 
+    momenta: ClassVar[tuple[float, float]] = (0.9, 0.99)
+    """As theirs: an entry that is hit after a long silence must not move for long."""
+
     def __init__(
         self, network: TransportNetwork, examples: Examples, apart: Examples, plan: TrainingPlan
     ) -> None:
