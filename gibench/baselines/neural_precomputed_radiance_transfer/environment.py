@@ -19,7 +19,8 @@ def picture_of(environment: EnvironmentMap) -> NDArray[np.float32]:
     return np.ascontiguousarray(np.moveaxis(resampled(pixels, ROWS), -1, 0))
 
 
-def mean_radiance(picture: NDArray[np.float32]) -> float:
-    """Mean over the sphere and the colours of a picture (3, H, 2·H)."""
-    rows = picture.mean(axis=(0, 2), dtype=np.float64)
-    return float(rows @ solid_angles(len(rows)) / solid_angles(len(rows)).sum())
+def mean_radiance(picture: NDArray[np.float32]) -> NDArray[np.float64]:
+    """(3,) mean over the sphere of each colour of a picture (3, H, 2·H)."""
+    rows = picture.mean(axis=2, dtype=np.float64)
+    weights = solid_angles(rows.shape[1])
+    return np.asarray(rows @ weights / weights.sum())

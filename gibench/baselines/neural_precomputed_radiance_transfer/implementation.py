@@ -43,11 +43,11 @@ class NeuralTransfer(RelitByNetwork):
         """Its picture (3, 128, 256)."""
         return picture_of(environment)
 
-    def told(self, light: Light) -> tuple[Tensor, float]:
-        """The code of the light, and its mean radiance."""
+    def told(self, light: Light) -> tuple[Tensor, Tensor]:
+        """The code of the light, and its mean radiances."""
         picture, mean = in_units(light)
-        return self.network.encoder(picture[None].to(torch_device()))[0], mean
+        return self.network.encoder(picture[None].to(torch_device()))[0], mean.to(torch_device())
 
-    def radiance(self, points: Tensor, material: Tensor, told: tuple[Tensor, float]) -> Tensor:
+    def radiance(self, points: Tensor, material: Tensor, told: tuple[Tensor, Tensor]) -> Tensor:
         """What both branches say."""
         return self.network.frame(points, material, *told)

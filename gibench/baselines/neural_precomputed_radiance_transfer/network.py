@@ -48,7 +48,7 @@ class LightEncoder(nn.Module):
         self.last = nn.Linear(CHANNELS * SIDES[0] * SIDES[1], CODE)
 
     def forward(self, picture: Tensor) -> Tensor:
-        """(N, 3, 128, 256), each divided by its own mean radiance, to (N, 64)."""
+        """(N, 3, 128, 256), each colour of each divided by its own mean radiance, to (N, 64)."""
         # Lamps are thousands of times brighter than walls.
         code: Tensor = self.last(self.convolutions(torch.log1p(picture)).flatten(1))
         return code
@@ -94,7 +94,7 @@ class TransferNetwork(nn.Module):
         self.separated = separated
 
     def decoded(self, points: Tensor, material: Tensor, eye: Tensor, light: Tensor) -> Tensor:
-        """Radiance (…, N, 3) in units of the mean radiance of the environment, whose code is light (…, 64).
+        """Radiance (…, N, 3) in units of the mean radiances of the environment, whose code is light (…, 64).
 
         points: (…, N, 3) in the unit cube. material: (…, N, 13). eye: (…, N, 3), directions towards it.
         """
@@ -109,21 +109,21 @@ class TransferNetwork(nn.Module):
         return found
 
     def forward(self, points: Tensor, material: Tensor, picture: Tensor, mean: Tensor) -> Tensor:
-        """Radiance (N, P, 3), signed. picture: (N, 3, 128, 256) in units of `mean` (N,), the environment's radiance.
+        """Radiance (N, P, 3), signed. picture: (N, 3, 128, 256) in units of `mean` (N, 3), the environment's radiance.
 
-        It is linear in the mean.
+        It is linear in the means.
         """
         return self.lit(points, material, self.encoder(picture), mean)
 
     def lit(self, points: Tensor, material: Tensor, light: Tensor, mean: Tensor) -> Tensor:
         """As `forward`, under codes of light (N, 64)."""
-        return self.decoded(points, material, towards_eye(material), light) * mean[:, None, None]
+        return self.decoded(points, material, towards_eye(material), light) * mean[:, None]
 
     @torch.inference_mode()
-    def frame(self, points: Tensor, material: Tensor, light: Tensor, mean: float) -> Tensor:
-        """As `forward` of one frame (P, 3) of any size, in bounded memory. light: the code (64,)."""
+    def frame(self, points: Tensor, material: Tensor, light: Tensor, mean: Tensor) -> Tensor:
+        """As `forward` of one frame (P, 3) of any size, in bounded memory. light: the code (64,). mean: (3,)."""
         radiance = points.new_zeros(len(points), 3)
-        if mean > 0:
+        if mean.any():
             for start in range(0, len(points), AT_ONCE):
                 some = slice(start, start + AT_ONCE)
                 few = material[some]

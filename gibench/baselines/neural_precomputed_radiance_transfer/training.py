@@ -19,9 +19,6 @@ from gibench.baselines.training.precision import mixed
 STEPS = 500_000
 """Where no time is set."""
 
-TINT = 0.5
-"""Spread of the logarithms of the gains that a frame's colours are turned up and down by."""
-
 LOGARITHM = MuLaw(mu=1.0)
 """log(1 + x) / log 2, continued to negative numbers."""
 
@@ -42,23 +39,14 @@ class RadianceTransfer(RelightingLearner):
         super().__init__(network, examples, apart, seed)
 
     def draw(self, example: tuple[Seen, Light], random: np.random.Generator) -> Example:
-        """Any pixels, under light of another tint. A frame that sees no surface gives pixels that are black in truth,
-        without light.
-
-        Light transport keeps the three colours apart, so red light twice as bright is twice as bright a red. The
-        encoder is not told that, and of a few hundred environments, most of them warm, learns one cast for all.
-        """
+        """Any pixels. A frame that sees no surface gives pixels that are black in truth, without light."""
         seen, picture = example
-        tint = np.exp(TINT * random.standard_normal(3)).astype(np.float32)
-        tint /= tint.mean()
-        picture = picture * tint[:, None, None]
         if not len(seen.points):
             seen = Seen(*(torch.zeros(1, *part.shape[1:]) for part in seen))
             picture = np.zeros_like(picture)
-        found = example_of(
+        return example_of(
             seen, picture, torch.from_numpy(random.integers(len(seen.points), size=self.pixels))
         )
-        return found._replace(truth=found.truth * torch.from_numpy(tint))
 
     def judged(self, example: tuple[Seen, Light]) -> Example:
         """Pixels all over the frame."""
@@ -79,13 +67,19 @@ class RadianceTransfer(RelightingLearner):
 
 
 def example_of(seen: Seen, picture: Light, pixel: Tensor) -> Example:
-    """Some pixels of a frame; inputs are points, material, the picture in units of its mean, and that mean."""
+    """Some pixels of a frame; inputs are points, material, the picture in units of its means, and these."""
     truth, points, material = some_of(seen, pixel)
     unit, mean = in_units(picture)
-    return Example(truth, (points, material, unit, torch.tensor(mean, dtype=torch.float32)))
+    return Example(truth, (points, material, unit, mean))
 
 
-def in_units(picture: Light) -> tuple[Tensor, float]:
-    """A picture (3, H, 2·H) in units of its mean radiance, and that; black stays black."""
+def in_units(picture: Light) -> tuple[Tensor, Tensor]:
+    """A picture (3, H, 2·H), each colour in units of its own mean radiance, and these (3,); black stays black.
+
+    Light transport keeps the three colours apart: twice the red is twice the red reflected, whatever there is of green
+    and blue. With one unit for all an encoder would have to learn that, and of a few hundred environments, most of them
+    warm, it learns one cast for all.
+    """
     mean = mean_radiance(picture)
-    return torch.from_numpy((picture / (mean if mean > 0 else 1.0)).astype(np.float32)), mean
+    unit = picture / np.where(mean > 0, mean, 1.0)[:, None, None]
+    return torch.from_numpy(unit.astype(np.float32)), torch.from_numpy(mean.astype(np.float32))

@@ -54,13 +54,15 @@ def test_a_frame_is_what_training_sees(monkeypatch, separated):
     points, material = pixels(50)
     picture = torch.rand(1, 3, 128, 256)
     with torch.no_grad():
-        expected = network(points[None], material[None], picture, torch.tensor([3.0]))[0]
+        mean = torch.tensor([3.0, 2.0, 0.0])
+        expected = network(points[None], material[None], picture, mean[None])[0]
         light = network.encoder(picture)[0]
-    torch.testing.assert_close(network.frame(points, material, light, 3.0), expected, rtol=1e-4, atol=1e-5)
-    once, twice = (network.frame(points, material, light, mean) for mean in (3.0, 6.0))
+    torch.testing.assert_close(network.frame(points, material, light, mean), expected, rtol=1e-4, atol=1e-5)
+    once, twice = (network.frame(points, material, light, factor * mean) for factor in (1, 2))
     torch.testing.assert_close(twice, 2 * once, rtol=1e-6, atol=1e-6)
-    assert not network.frame(points, material, light, 0.0).any()
-    assert network.frame(points[:0], material[:0], light, 3.0).shape == (0, 3)
+    assert not once[:, 2].any()
+    assert not network.frame(points, material, light, 0 * mean).any()
+    assert network.frame(points[:0], material[:0], light, mean).shape == (0, 3)
 
 
 def test_black_surfaces_reflect_nothing():
@@ -68,7 +70,7 @@ def test_black_surfaces_reflect_nothing():
     network = TransferNetwork().eval()
     points, material = pixels(20)
     material[:, 7:] = 0
-    assert not network.frame(points, material, torch.randn(64), 1.0).any()
+    assert not network.frame(points, material, torch.randn(64), torch.ones(3)).any()
 
 
 def test_the_eye_is_where_it_was():
@@ -85,10 +87,15 @@ def test_pictures_have_one_size_and_the_mean_of_the_sphere(height):
     picture = picture_of(EnvironmentMap(Panorama.of("made", pixels), 0.4))
     assert picture.shape == (3, 128, 256)
     weights = solid_angles(height)
-    expected = (pixels.mean(axis=(1, 2)) @ weights) / weights.sum()
-    assert mean_radiance(picture) == pytest.approx(expected, rel=1e-3)
+    expected = (weights @ pixels.mean(axis=1)) / weights.sum()
+    np.testing.assert_allclose(mean_radiance(picture), expected, rtol=1e-3)
     unit, mean = in_units(picture)
-    assert mean_radiance(unit.numpy()) == pytest.approx(1, rel=1e-4)
-    assert mean == pytest.approx(expected, rel=1e-3)
+    np.testing.assert_allclose(mean_radiance(unit.numpy()), 1, rtol=1e-4)
+    np.testing.assert_allclose(mean, expected, rtol=1e-3)
     assert LightEncoder()(unit[None]).isfinite().all()
-    assert in_units(0 * picture)[1] == 0
+    # A tint of the light is one of what it lights: the encoder sees the same.
+    tinted = picture * np.float32([2, 0.5, 0])[:, None, None]
+    torch.testing.assert_close(in_units(tinted)[0][:2], unit[:2])
+    torch.testing.assert_close(in_units(tinted)[1], mean * torch.tensor([2, 0.5, 0]))
+    assert not in_units(tinted)[0][2].any()
+    assert not in_units(0 * picture)[1].any()

@@ -49,25 +49,5 @@ def test_frames_that_see_nothing():
     empty = Seen(*(part[:0] for part in seen))
     example = learner.draw((empty, picture), np.random.default_rng(0))
     assert not example.truth.any()
-    assert example.inputs[3] == 0
+    assert not example.inputs[3].any()
     assert learner.judged((empty, picture)).truth.numel() == 0
-
-
-def test_a_tint_of_the_light_is_one_of_what_it_lights():
-    learner = RadianceTransfer(TransferNetwork(), Pictures(1), Pictures(1), 4096, 3)
-    seen, picture = Pictures(1)[0]
-    tints = []
-    for seed in range(20):
-        example = learner.draw((seen, picture), np.random.default_rng(seed))
-        _, material, unit, mean = example.inputs
-        tint = (unit * mean).mean(dim=(1, 2)).numpy() / picture.mean(axis=(1, 2))
-        half = 0.5 * picture.mean(axis=(1, 2)) * tint * material[:, 7:10].numpy()
-        np.testing.assert_allclose(example.truth, half, rtol=1e-5)
-        tints.append(tint)
-    assert np.std(tints, axis=0).min() > 0.2
-    np.testing.assert_allclose(np.mean(tints, axis=1), 1, rtol=1e-5)
-    # What is held out is seen as it is.
-    judged = learner.judged((seen, picture))
-    np.testing.assert_allclose(
-        (judged.inputs[2][0] * judged.inputs[3]).mean(dim=(1, 2)), picture.mean(axis=(1, 2)), rtol=1e-5
-    )
