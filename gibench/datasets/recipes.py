@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 from pydantic_core import PydanticCustomError
 
 from gibench import gate
+from gibench.datasets.checked import plain_name
 from gibench.datasets.errors import RecipeError, nearest
 from gibench.rendering import channels as contract
 
@@ -365,6 +366,11 @@ class Recipe(BaseModel):
     @field_validator("splits")
     @classmethod
     def _whole_splits(cls, splits: dict[str, float]) -> dict[str, float]:
+        for name in splits:
+            try:
+                plain_name(name)  # exports make files of it
+            except ValueError as problem:
+                raise PydanticCustomError("splits", "{text}", {"text": str(problem)}) from None
         # Put so that NaN, which TOML has, fails too.
         if not (splits and all(s >= 0 for s in splits.values()) and abs(sum(splits.values()) - 1) <= 1e-6):
             raise PydanticCustomError("splits", "the shares do not sum to 1")

@@ -242,6 +242,15 @@ def test_huggingface(rooms, tmp_path_factory, capsys):
     assert sorted(path.name for path in out.iterdir()) == ["README.md", "data"]
 
 
+def test_a_split_that_the_library_would_not_load_is_refused(rooms, tmp_path):
+    pytest.importorskip("datasets")
+    dataset = open_dataset(rooms)
+    dataset.frames["split"] = "un-seen"
+    with pytest.raises(DatasetError, match="split 'un-seen' cannot be read by the library datasets"):
+        export(dataset, "huggingface", tmp_path / "out")
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.parametrize("to", sorted(FORMATS))
 def test_some_channels_of_one_split(rooms, to, tmp_path):
     """A frame without positions or light can be written too."""
