@@ -89,12 +89,7 @@ def refuse_other(root: Path, manifest: Mapping[str, Any], recipe: Recipe) -> Non
 
     More rooms than there are is no difference: the dataset is extended.
     """
-    there, asked = dict(manifest["identity"]), recipe.identity()
-    differences = {
-        key: (there.get(key), asked.get(key))
-        for key in [*asked, *(there.keys() - asked.keys())]
-        if there.get(key) != asked.get(key)
-    }
+    differences = other_values(manifest["identity"], recipe.identity())
     if recipe.rooms < manifest["recipe"]["rooms"]:
         differences = {"rooms": (manifest["recipe"]["rooms"], recipe.rooms)} | differences
     if differences:
@@ -105,6 +100,21 @@ def refuse_other(root: Path, manifest: Mapping[str, Any], recipe: Recipe) -> Non
             f"{root} holds another dataset ({listed}): to continue it run `{manifest['command']}`, "
             "for a new one choose another --out"
         )
+
+
+def other_values(there: Mapping[str, Any], asked: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:
+    """Keys in which two identities of recipes differ, each with both values; of tables also the order of their names.
+
+    It decides as much as the names: the split of a room, the number of a view, the map of a frame.
+    """
+    differences = {}
+    for key in [*asked, *(there.keys() - asked.keys())]:
+        one, other = there.get(key), asked.get(key)
+        if one != other:
+            differences[key] = (one, other)
+        elif isinstance(one, dict) and isinstance(other, dict) and list(one) != list(other):
+            differences[f"order of {key}"] = (list(one), list(other))
+    return differences
 
 
 def refuse_other_makers(root: Path, manifest: Mapping[str, Any], facts: Mapping[str, Any]) -> None:

@@ -65,6 +65,10 @@ class Recipe(BaseModel):
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
+    def __eq__(self, other: object) -> bool:
+        """Whether all values are equal, and those of tables in the same order, which decides as much."""
+        return isinstance(other, Recipe) and self.model_dump_json() == other.model_dump_json()
+
     rooms: int = Field(10, ge=1, le=10**6, description="an integer from 1 to 1000000")
     seed: int = Field(0, ge=0, lt=2**63, description="an integer from 0 to 2⁶³−1")
     kinds: Names = Field(("all",), validate_default=True, description='a list of room kinds, or ["all"]')
@@ -379,7 +383,8 @@ class Recipe(BaseModel):
     def identity(self) -> dict[str, Any]:
         """Return the recipe as JSON-able values without the number of rooms, which alone may grow.
 
-        Files count by their content (SHA-256), not by where they lie. Raises `RecipeError` or `SceneFileError` for one
+        Files count by their content (SHA-256), not by where they lie. The order of tables counts (`other_values` of
+        `gibench.datasets.manifest` compares it), as JSON keeps it. Raises `RecipeError` or `SceneFileError` for one
         that cannot be read.
         """
         values = self.model_dump(mode="json", exclude={"rooms"})

@@ -1,8 +1,10 @@
+import json
 from pathlib import Path
 
 import pytest
 
-from gibench.datasets.errors import RecipeError
+from gibench.datasets.errors import FolderError, RecipeError
+from gibench.datasets.manifest import refuse_other
 from gibench.datasets.recipes import Recipe, check_recipe, load_preset, load_recipe, preset_names
 from gibench.rendering.channels import resolve
 
@@ -50,6 +52,28 @@ def test_identity_leaves_out_the_number_of_rooms_and_takes_files_by_content(tmp_
     (tmp_path / "c.exr").write_bytes(b"other")
     a, b, c = (Recipe(environment=str(tmp_path / f"{name}.exr")).identity() for name in "abc")
     assert a == b != c
+
+
+@pytest.mark.parametrize(
+    ("key", "values"),
+    [
+        ("splits", {"train": 0.5, "test": 0.5}),
+        ("sequences", {"a": {"views": 2}, "b": {"views": 2}}),
+        ("environments", ["aerodynamics_workshop", "autoshop_01"]),
+    ],
+)
+def test_the_order_of_tables_is_part_of_the_identity(tmp_path, key, values):
+    light = {"lighting": "environments"} if key == "environments" else {}
+    turned = values[::-1] if isinstance(values, list) else dict(reversed(values.items()))
+    one, other = (check_recipe({**light, key: table}) for table in (values, turned))
+    assert one != other
+    assert one == check_recipe({**light, key: values})
+    manifest = {"identity": one.identity(), "recipe": one.model_dump(mode="json"), "command": "make-dataset"}
+    manifest = json.loads(json.dumps(manifest))
+    refuse_other(tmp_path, manifest, one)
+    refuse_other(tmp_path, manifest, Recipe.model_validate(manifest["recipe"]))
+    with pytest.raises(FolderError, match=f"holds another dataset .order of {key}: "):
+        refuse_other(tmp_path, manifest, other)
 
 
 def test_a_recipe_survives_json():
