@@ -380,12 +380,18 @@ class Recipe(BaseModel):
             raise PydanticCustomError("splits", "the shares do not sum to 1")
         return splits
 
-    def identity(self) -> dict[str, Any]:
+    @property
+    def keys_of_files(self) -> frozenset[str]:
+        """Keys of `identity` whose values are read from files."""
+        keys = {key for key in ("environments", "scenes", "cameras") if getattr(self, key)}
+        return frozenset(keys | ({"environment"} if self.environment not in ENVIRONMENTS else set()))
+
+    def identity(self, *, files: bool = True) -> dict[str, Any]:
         """Return the recipe as JSON-able values without the number of rooms, which alone may grow.
 
         Files count by their content (SHA-256), not by where they lie. The order of tables counts (`other_values` of
-        `gibench.datasets.manifest` compares it), as JSON keeps it. Raises `RecipeError` or `SceneFileError` for one
-        that cannot be read.
+        `gibench.datasets.manifest` compares it), as JSON keeps it. files: whether they are read; `keys_of_files` are left
+        out otherwise. Raises `RecipeError` or `SceneFileError` for a file that cannot be read.
         """
         values = self.model_dump(mode="json", exclude={"rooms"})
         # Datasets that were begun before these keys existed hold the same frames.
@@ -413,26 +419,30 @@ class Recipe(BaseModel):
         ):
             if not values[key] or values[key] == type(self).model_fields[key].default:
                 del values[key]
-        if self.environments:
-            values["environments"] = {
-                file.name: f"sha256:{file_sha256(file.path)}" for file in self.environment_files()
-            }
-        if self.environment not in ENVIRONMENTS:
-            values["environment"] = f"sha256:{file_sha256(Path(self.environment))}"
         if self.scenes:
-            from gibench.generators.imported.scene import fingerprint
-
-            settings = self.import_settings()
-            values["scenes"] = [f"sha256:{fingerprint(Path(scene), settings)}" for scene in self.scenes]
             del values["kinds"]
-            if self.cameras is not None:
-                values["cameras"] = f"sha256:{file_sha256(Path(self.cameras))}"
         else:
             for key in ("scenes", "up", "scale", "allow_missing", "allow_outside", "cameras"):
                 del values[key]
         if not self.parameters:
             del values["parameters"]
+        for key in sorted(self.keys_of_files):
+            if files:
+                values[key] = self._content(key)
+            else:
+                del values[key]
         return values
+
+    def _content(self, key: str) -> Any:
+        """What a key of `keys_of_files` stands for, by the content of its files."""
+        if key == "environments":
+            return {file.name: f"sha256:{file_sha256(file.path)}" for file in self.environment_files()}
+        if key == "scenes":
+            from gibench.generators.imported.scene import fingerprint
+
+            settings = self.import_settings()
+            return [f"sha256:{fingerprint(Path(scene), settings)}" for scene in self.scenes]
+        return f"sha256:{file_sha256(Path(getattr(self, key)))}"
 
     def environment_files(self) -> tuple[EnvironmentFile, ...]:
         """The maps that frames are lit by. Raises `RecipeError` for a name that is none, or a folder without one."""

@@ -65,6 +65,8 @@ class Manifest(Checked):
     rejected_rooms: dict[RoomNumber, str]
     rejections: dict[str, Count] = Field(default_factory=dict)
     totals: Totals | None = None
+    records: Sha256 | None = None
+    card: bool = False
 
 
 class AreaLightRecord(Checked):
