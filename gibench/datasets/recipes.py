@@ -39,6 +39,9 @@ OPTIONS = {
     "parameters": "-D",
 }
 
+#: Channels whose samples are counted until an error is reached; radiance cues take as many.
+RADIANCE = frozenset((*contract.SETS["radiance"], *contract.SAMPLED))
+
 # Lists in TOML become tuples here: a recipe is a value that can be compared and hashed.
 Names = Annotated[tuple[str, ...], Field(strict=False, min_length=1)]
 
@@ -211,6 +214,11 @@ class Recipe(BaseModel):
     def _samples_that_can_be(self) -> Self:
         if self.spp is not None and self.error is not None:
             raise PydanticCustomError("both", "spp and error are both set; keep one of them")
+        asked = set(self.channels)
+        if self.error is not None and asked & {*contract.CUES} and not asked & RADIANCE:
+            raise PydanticCustomError(
+                "cues", "radiance cues need spp where no radiance is asked for: give it in place of error"
+            )
         if self.spp == 1 and "color_se" in self.channels:
             raise PydanticCustomError(
                 "single", "channel color_se needs spp from 2 on; raise spp, or name channels without color_se"
@@ -592,6 +600,8 @@ def _message(
             source = "options"
         elif problem["type"] == "single" and "spp" in options:
             source = "--spp"
+        elif problem["type"] == "cues" and "error" in options:
+            source = "--error"
         elif problem["type"] == "views":
             source = _place("views", source, options)
         return f"{source}: {problem['msg']}"

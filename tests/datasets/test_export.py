@@ -284,6 +284,24 @@ def test_refusals_leave_nothing_behind(rooms, tmp_path, capsys):
     assert capsys.readouterr().err.startswith("error: ")
 
 
+@pytest.mark.parametrize(
+    ("channel", "says"),
+    [
+        ("surfaces", "unknown channel or set 'surfaces': did you mean surface"),
+        ("motion", "no channel 'motion'"),
+    ],
+)
+@pytest.mark.parametrize("words", [["cache"], ["export", "--to", "webdataset", "--out", "out"]])
+def test_channels_that_are_not_there_are_a_mistake(
+    rooms, tmp_path, monkeypatch, capsys, words, channel, says
+):
+    monkeypatch.chdir(tmp_path)
+    command, *more = words
+    assert run(app, ["dataset", command, str(rooms), "--channels", channel, *more]) == 2
+    assert says in " ".join(capsys.readouterr().err.split())
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_an_export_that_is_stopped_leaves_nothing(rooms, tmp_path):
     def stop(done: int, of: int) -> None:
         if done == 2:

@@ -98,6 +98,10 @@ def test_a_recipe_survives_json():
         ("spp = 4\nerror = 0.1", "spp and error are both set"),
         ("spp = 1", "color_se needs spp from 2 on; raise spp, or name channels without color_se"),
         ("error = 0.1\nspp_cap = 63", "spp_cap: 63 is not allowed; allowed is an integer from 64"),
+        (
+            'error = 0.1\nchannels = ["radiance_cue_2", "depth"]',
+            "radiance cues need spp where no radiance is asked for: give it in place of error",
+        ),
         ("splits = {train = nan}", "the shares do not sum to 1"),
         ("splits = {train = 2.0, test = -1.0}", "the shares do not sum to 1"),
         ("roms = 4", "unknown key 'roms'; did you mean 'rooms'"),
@@ -130,6 +134,9 @@ def test_wrong_options_are_named_as_options():
         load_preset("small", {"kinds": ("kitchen",)})
     with pytest.raises(RecipeError, match="both set"):
         load_preset("small", {"spp": 4, "error": 0.1})
+    with pytest.raises(RecipeError, match=r"^--error: radiance cues need spp"):
+        load_preset("small", {"error": 0.1, "channels": ("lighting",)})
+    assert load_preset("small", {"error": 0.1, "channels": ("lighting", "color")}).error == 0.1
 
 
 def test_missing_files_and_presets():
