@@ -19,6 +19,7 @@ from gibench.errors import GibenchError
 EXIT_CODES = {
     **dict.fromkeys(("RecipeError", "FolderError", "DatasetError", "SceneFileError", "GateError"), 2),
     **dict.fromkeys(("NoPlaceForCamera", "BadScene", "ClusterError"), 2),
+    **dict.fromkeys(("UnknownChannelError", "UnknownChannel"), 2),
     **dict.fromkeys(("TrackError", "RegistryError", "ResultsError", "MethodError", "UnknownMetricError"), 2),
     "Interrupted": 130,
 }

@@ -22,6 +22,7 @@ def convert(
 ) -> None:
     """Write a scene for Mitsuba 3: Z up, metres, with all its files, and say what was changed."""
     from gibench.cli.making import print_scene
+    from gibench.datasets.files import whole_folder
     from gibench.generators.imported.errors import SceneFileError
     from gibench.generators.imported.room import describe, import_room, write_imported_room
     from gibench.generators.imported.scene import ImportSettings, import_scene
@@ -38,8 +39,10 @@ def convert(
     read = import_scene(scene, settings)
     room = import_room(read, resolution=read.resolution, views=0 if read.cameras else 1)
     try:
-        write_imported_room(room, out, max_depth=read.max_depth, resolution=read.resolution, spp=64)
+        with whole_folder(out.resolve()) as partial:
+            write_imported_room(room, partial, max_depth=read.max_depth, resolution=read.resolution, spp=64)
     except OSError as problem:
-        raise SceneFileError(f"{problem.filename or out}: {problem.strerror}") from None
+        where = f"{problem.filename}: " if problem.filename else ""
+        raise SceneFileError(f"{out} cannot be written: {where}{problem.strerror or problem}") from None
     print_scene(describe(room))
     say(str(out / "scene.xml"))

@@ -27,7 +27,8 @@ class Checked(BaseModel):
     model_config = ConfigDict(extra="allow", strict=True, frozen=True, allow_inf_nan=False)
 
 
-def _name(text: str) -> str:
+def plain_name(text: str) -> str:
+    """Return a text that may become part of the name of a file. Raises ValueError for another."""
     if not gate.is_name(text):
         raise ValueError(
             f"{shown(text)} is no name: letters, digits and _ . + : @ = - may follow a letter or digit, "
@@ -36,7 +37,7 @@ def _name(text: str) -> str:
     return text
 
 
-Name = Annotated[str, AfterValidator(_name)]
+Name = Annotated[str, AfterValidator(plain_name)]
 """A text that may become part of the name of a file."""
 
 Count = Annotated[int, Field(ge=0, lt=2**63)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+import re
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,9 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gibench.datasets import pool
+from gibench.datasets.checked import plain
 from gibench.datasets.errors import FolderError, MakingError
 from gibench.datasets.files import as_json, write_whole
 from gibench.datasets.making import default_threads
+from gibench.datasets.manifest import refuse_other_makers
 
 if TYPE_CHECKING:
     from gibench.generators.parts import Room
@@ -33,6 +35,9 @@ MAX_DEPTH = 8
 
 RECORD = "environments.json"
 """Beside the panoramas: what decides their pixels."""
+
+LEFTOVER = rf"\.{re.escape(RECORD)}\.partial-[0-9]+"
+"""Names of what a run leaves that is killed while it writes RECORD."""
 
 
 def room_seed(seed: int) -> int:
@@ -60,7 +65,8 @@ def make_environments(
     pixels. workers: processes that render at the same time, which do not change them. on_done: told how many are there,
     and of how many. Returns the files, OpenEXR, radiance in W·m⁻²·sr⁻¹.
 
-    Raises FolderError for a folder of other settings or one that cannot be written, MakingError when most rooms fail.
+    Raises FolderError for a folder of other settings, another variant or other versions, or one that cannot be written,
+    MakingError when most rooms fail.
     """
     _claimed(out, {"seed": seed, "spp": spp, "height": height})
     work = pool.Work(
@@ -84,7 +90,9 @@ def make_environments(
             else:
                 rejected.add(number)
 
-        listener = pool.Listener(lambda facts: None, lambda *message: None, told, lambda number: None)
+        listener = pool.Listener(
+            partial(_refuse_other_makers, out), lambda *message: None, told, lambda number: None
+        )
         pool.run_rooms(work, left, listener, workers=min(workers, len(left)))
 
 
@@ -92,12 +100,14 @@ def _file(out: Path, seed: int, number: int) -> Path:
     return out / f"room-{seed}-{number:05d}.exr"
 
 
-def _ready(variant: str, threads: int) -> None:
-    """Make a worker ready."""
+def _ready(variant: str, threads: int) -> dict[str, Any]:
+    """Make a worker ready. Returns what makes the pixels: `variant` and `versions`."""
+    from gibench.datasets.room_making import versions_here
     from gibench.rendering import backend
 
-    backend.select_variant(variant)
+    variant = backend.select_variant(variant)
     backend.limit_threads(threads)
+    return {"variant": variant, "versions": versions_here()}
 
 
 @dataclass(frozen=True)
@@ -171,19 +181,42 @@ def _claimed(out: Path, settings: dict[str, Any]) -> None:
     try:
         out.mkdir(parents=True, exist_ok=True)
         if record.is_file():
-            made = json.loads(record.read_text(encoding="utf-8"))
-            if made != settings:
+            made = _recorded(out)
+            there = {key: made.get(key) for key in settings}
+            if there != settings:
                 raise FolderError(
-                    f"{out} holds panoramas of other settings ({made}): choose another folder with --out"
+                    f"{out} holds panoramas of other settings ({there}): choose another folder with --out"
                 )
-        elif any(out.iterdir()):
+        elif any(not re.fullmatch(LEFTOVER, path.name) for path in out.iterdir()):
             raise FolderError(f"{out} holds something else: choose a new folder with --out")
         else:
             write_whole(record, as_json(settings))
     except OSError as problem:
         raise FolderError(f"{problem.filename or out}: {problem.strerror}") from None
+
+
+def _recorded(out: Path) -> dict[str, Any]:
+    try:
+        return plain((out / RECORD).read_bytes())
     except ValueError:
-        raise FolderError(f"{record} is damaged: remove the folder, or choose another with --out") from None
+        raise FolderError(
+            f"{out / RECORD} is damaged: remove the folder, or choose another with --out"
+        ) from None
+
+
+def _refuse_other_makers(out: Path, facts: dict[str, Any]) -> None:
+    """Write down what makes the pixels before the first panorama, or refuse to mix others in. Raises FolderError.
+
+    Folders of older versions do not say what made theirs, and go on.
+    """
+    record = _recorded(out)
+    if "variant" in record:
+        refuse_other_makers(out, {"versions": {}, **record}, facts)
+    elif not any(out.glob("*.exr")):
+        try:
+            write_whole(out / RECORD, as_json(record | facts))
+        except OSError as problem:
+            raise FolderError(f"{problem.filename or out}: {problem.strerror}") from None
 
 
 def _written(file: Path, image: NDArray[np.float32]) -> None:

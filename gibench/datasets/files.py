@@ -5,6 +5,9 @@ from __future__ import annotations
 import json
 import os
 import secrets
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -36,6 +39,25 @@ def write_whole(path: Path, content: bytes) -> None:
         beside.unlink(missing_ok=True)
         raise
     sync_folder(path.parent)
+
+
+@contextmanager
+def whole_folder(path: Path) -> Iterator[Path]:
+    """A folder beside `path` to write into, which takes its name at the end: it appears whole or not at all.
+
+    path: where nothing lies yet, or an empty folder. Raises OSError; nothing is left behind then.
+    """
+    beside = path.with_name(f".{path.name}.partial-{process_number()}")
+    try:
+        beside.mkdir(parents=True)
+        yield beside
+        sync_tree(beside)
+        if path.is_dir():
+            path.rmdir()
+        beside.rename(path)
+        sync_folder(path.parent)
+    finally:
+        shutil.rmtree(beside, ignore_errors=True)
 
 
 def through_no_link(path: str, flags: int) -> int:

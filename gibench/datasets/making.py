@@ -242,6 +242,7 @@ class _Run:
         if len(table):
             write_picture(self.root / folder.PREVIEW, contact_sheet(self.root, table))
             write_whole(self.root / folder.CARD, card(self.root, manifest, table).encode())
+            manifest["card"] = True
         manifests.write_manifest(self.root, manifest)
         self.manifest = manifest
 

@@ -6,10 +6,11 @@ gathered from these records, so they can be written anew at any time.
 
 from __future__ import annotations
 
+import hashlib
 import io
 import json
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -89,22 +90,32 @@ def refuse_other(root: Path, manifest: Mapping[str, Any], recipe: Recipe) -> Non
 
     More rooms than there are is no difference: the dataset is extended.
     """
-    there, asked = dict(manifest["identity"]), recipe.identity()
-    differences = {
-        key: (there.get(key), asked.get(key))
-        for key in [*asked, *(there.keys() - asked.keys())]
-        if there.get(key) != asked.get(key)
-    }
+    differences = other_values(manifest["identity"], recipe.identity())
     if recipe.rooms < manifest["recipe"]["rooms"]:
         differences = {"rooms": (manifest["recipe"]["rooms"], recipe.rooms)} | differences
     if differences:
         listed = "; ".join(
-            f"{key}: {_short(a)} there, {_short(b)} asked" for key, (a, b) in differences.items()
+            f"{key}: {short(a)} there, {short(b)} asked" for key, (a, b) in differences.items()
         )
         raise FolderError(
             f"{root} holds another dataset ({listed}): to continue it run `{manifest['command']}`, "
             "for a new one choose another --out"
         )
+
+
+def other_values(there: Mapping[str, Any], asked: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:
+    """Keys in which two identities of recipes differ, each with both values; of tables also the order of their names.
+
+    It decides as much as the names: the split of a room, the number of a view, the map of a frame.
+    """
+    differences = {}
+    for key in [*asked, *(there.keys() - asked.keys())]:
+        one, other = there.get(key), asked.get(key)
+        if one != other:
+            differences[key] = (one, other)
+        elif isinstance(one, dict) and isinstance(other, dict) and list(one) != list(other):
+            differences[f"order of {key}"] = (list(one), list(other))
+    return differences
 
 
 def refuse_other_makers(root: Path, manifest: Mapping[str, Any], facts: Mapping[str, Any]) -> None:
@@ -123,7 +134,8 @@ def refuse_other_makers(root: Path, manifest: Mapping[str, Any], facts: Mapping[
         )
 
 
-def _short(value: Any) -> str:
+def short(value: Any) -> str:
+    """JSON of a value in a message, cut to a length."""
     text = json.dumps(value, ensure_ascii=False)
     return text if len(text) <= 60 else text[:57] + "…"
 
@@ -147,10 +159,35 @@ def gathered(root: Path, manifest: Mapping[str, Any]) -> tuple[dict[str, Any], p
     records = [room_record(root, room) for room in whole_rooms(root)]
     recipe = recipe_of(manifest)
     table = frame_table(records, recipe)
+    rejected = {r: why for r, why in manifest["rejected_rooms"].items() if int(r) < recipe.rooms}
+    return {
+        **manifest,
+        "complete": len(records) + len(rejected) >= recipe.rooms,
+        "rejected_rooms": rejected,
+        "rejections": rejections_of(records),
+        "totals": totals_of(records, table, recipe),
+        "records": records_digest(records),
+    }, table
+
+
+def rejections_of(records: Iterable[Mapping[str, Any]]) -> dict[str, int]:
+    """Count what was rejected in rooms, by its reason."""
     rejections: Counter[str] = Counter()
     for record in records:
         rejections.update(record["rejections"])
-    rejected = {r: why for r, why in manifest["rejected_rooms"].items() if int(r) < recipe.rooms}
+    return dict(sorted(rejections.items()))
+
+
+def records_digest(records: Iterable[Mapping[str, Any]]) -> str:
+    """SHA-256 of the records of rooms, in their order; what they hold besides the table is in nothing else."""
+    digest = hashlib.sha256()
+    for record in records:
+        digest.update(json.dumps(record, sort_keys=True).encode() + b"\n")
+    return digest.hexdigest()
+
+
+def totals_of(records: Sequence[Mapping[str, Any]], table: pd.DataFrame, recipe: Recipe) -> dict[str, Any]:
+    """Sums over the rooms that are whole. table: of their records."""
     files = sum(file["bytes"] for record in records for file in record["files"].values())
     totals = {
         "rooms": len(records),
@@ -172,13 +209,7 @@ def gathered(root: Path, manifest: Mapping[str, Any]) -> tuple[dict[str, Any], p
     }
     if totals["median_error"] != totals["median_error"]:  # no frame has samples enough for an error
         totals["median_error"] = None
-    return {
-        **manifest,
-        "complete": len(records) + len(rejected) >= recipe.rooms,
-        "rejected_rooms": rejected,
-        "rejections": dict(sorted(rejections.items())),
-        "totals": totals,
-    }, table
+    return totals
 
 
 def large_changes(table: pd.DataFrame) -> list[dict[str, Any]]:

@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 from pydantic_core import PydanticCustomError
 
 from gibench import gate
+from gibench.datasets.checked import plain_name
 from gibench.datasets.errors import RecipeError, nearest
 from gibench.rendering import channels as contract
 
@@ -37,6 +38,9 @@ OPTIONS = {
     "allow_outside": "--allow-outside",
     "parameters": "-D",
 }
+
+#: Channels whose samples are counted until an error is reached; radiance cues take as many.
+RADIANCE = frozenset((*contract.SETS["radiance"], *contract.SAMPLED))
 
 # Lists in TOML become tuples here: a recipe is a value that can be compared and hashed.
 Names = Annotated[tuple[str, ...], Field(strict=False, min_length=1)]
@@ -63,6 +67,10 @@ class Recipe(BaseModel):
     """
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether all values are equal, and those of tables in the same order, which decides as much."""
+        return isinstance(other, Recipe) and self.model_dump_json() == other.model_dump_json()
 
     rooms: int = Field(10, ge=1, le=10**6, description="an integer from 1 to 1000000")
     seed: int = Field(0, ge=0, lt=2**63, description="an integer from 0 to 2⁶³−1")
@@ -206,6 +214,11 @@ class Recipe(BaseModel):
     def _samples_that_can_be(self) -> Self:
         if self.spp is not None and self.error is not None:
             raise PydanticCustomError("both", "spp and error are both set; keep one of them")
+        asked = set(self.channels)
+        if self.error is not None and asked & {*contract.CUES} and not asked & RADIANCE:
+            raise PydanticCustomError(
+                "cues", "radiance cues need spp where no radiance is asked for: give it in place of error"
+            )
         if self.spp == 1 and "color_se" in self.channels:
             raise PydanticCustomError(
                 "single", "channel color_se needs spp from 2 on; raise spp, or name channels without color_se"
@@ -365,16 +378,28 @@ class Recipe(BaseModel):
     @field_validator("splits")
     @classmethod
     def _whole_splits(cls, splits: dict[str, float]) -> dict[str, float]:
+        for name in splits:
+            try:
+                plain_name(name)  # exports make files of it
+            except ValueError as problem:
+                raise PydanticCustomError("splits", "{text}", {"text": str(problem)}) from None
         # Put so that NaN, which TOML has, fails too.
         if not (splits and all(s >= 0 for s in splits.values()) and abs(sum(splits.values()) - 1) <= 1e-6):
             raise PydanticCustomError("splits", "the shares do not sum to 1")
         return splits
 
-    def identity(self) -> dict[str, Any]:
+    @property
+    def keys_of_files(self) -> frozenset[str]:
+        """Keys of `identity` whose values are read from files."""
+        keys = {key for key in ("environments", "scenes", "cameras") if getattr(self, key)}
+        return frozenset(keys | ({"environment"} if self.environment not in ENVIRONMENTS else set()))
+
+    def identity(self, *, files: bool = True) -> dict[str, Any]:
         """Return the recipe as JSON-able values without the number of rooms, which alone may grow.
 
-        Files count by their content (SHA-256), not by where they lie. Raises `RecipeError` or `SceneFileError` for one
-        that cannot be read.
+        Files count by their content (SHA-256), not by where they lie. The order of tables counts (`other_values` of
+        `gibench.datasets.manifest` compares it), as JSON keeps it. files: whether they are read; `keys_of_files` are left
+        out otherwise. Raises `RecipeError` or `SceneFileError` for a file that cannot be read.
         """
         values = self.model_dump(mode="json", exclude={"rooms"})
         # Datasets that were begun before these keys existed hold the same frames.
@@ -402,26 +427,30 @@ class Recipe(BaseModel):
         ):
             if not values[key] or values[key] == type(self).model_fields[key].default:
                 del values[key]
-        if self.environments:
-            values["environments"] = {
-                file.name: f"sha256:{file_sha256(file.path)}" for file in self.environment_files()
-            }
-        if self.environment not in ENVIRONMENTS:
-            values["environment"] = f"sha256:{file_sha256(Path(self.environment))}"
         if self.scenes:
-            from gibench.generators.imported.scene import fingerprint
-
-            settings = self.import_settings()
-            values["scenes"] = [f"sha256:{fingerprint(Path(scene), settings)}" for scene in self.scenes]
             del values["kinds"]
-            if self.cameras is not None:
-                values["cameras"] = f"sha256:{file_sha256(Path(self.cameras))}"
         else:
             for key in ("scenes", "up", "scale", "allow_missing", "allow_outside", "cameras"):
                 del values[key]
         if not self.parameters:
             del values["parameters"]
+        for key in sorted(self.keys_of_files):
+            if files:
+                values[key] = self._content(key)
+            else:
+                del values[key]
         return values
+
+    def _content(self, key: str) -> Any:
+        """What a key of `keys_of_files` stands for, by the content of its files."""
+        if key == "environments":
+            return {file.name: f"sha256:{file_sha256(file.path)}" for file in self.environment_files()}
+        if key == "scenes":
+            from gibench.generators.imported.scene import fingerprint
+
+            settings = self.import_settings()
+            return [f"sha256:{fingerprint(Path(scene), settings)}" for scene in self.scenes]
+        return f"sha256:{file_sha256(Path(getattr(self, key)))}"
 
     def environment_files(self) -> tuple[EnvironmentFile, ...]:
         """The maps that frames are lit by. Raises `RecipeError` for a name that is none, or a folder without one."""
@@ -571,6 +600,8 @@ def _message(
             source = "options"
         elif problem["type"] == "single" and "spp" in options:
             source = "--spp"
+        elif problem["type"] == "cues" and "error" in options:
+            source = "--error"
         elif problem["type"] == "views":
             source = _place("views", source, options)
         return f"{source}: {problem['msg']}"

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from gibench.datasets.checked import Amount, Checked, Count, Fingerprint, Sha256
+from gibench.datasets.checked import Amount, Checked, Count, Fingerprint, Name, Sha256
 
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
@@ -45,7 +45,7 @@ class Totals(Checked):
     invalid_paths: Count
     kernel_seconds: Amount
     median_error: Amount | None
-    splits: dict[str, Count]
+    splits: dict[Name, Count]
     denoise_changes: list[DenoiseChange] = Field(default_factory=list)
     processors: dict[str, Count] = Field(default_factory=dict)
 
@@ -65,6 +65,8 @@ class Manifest(Checked):
     rejected_rooms: dict[RoomNumber, str]
     rejections: dict[str, Count] = Field(default_factory=dict)
     totals: Totals | None = None
+    records: Sha256 | None = None
+    card: bool = False
 
 
 class AreaLightRecord(Checked):
@@ -131,7 +133,7 @@ class RoomRecord(Checked):
 
     room: Count
     kind: str
-    split: str
+    split: Name
     given_cameras: Annotated[int, Field(ge=0, le=10**6)] = 0
     materials: list[str]
     shapes: list[str]

@@ -70,13 +70,20 @@ class Renderer:
             except BadEnvironment as problem:
                 raise RecipeError(f"environment: {problem}") from None
         panoramas_of(self.recipe)
-        versions = {"gibench": gibench.__version__}
-        versions |= {name: importlib.metadata.version(name) for name in GENERATING}
         return {
             "variant": variant,
-            "versions": versions | backend.versions(),
+            "versions": versions_here(),
             "gpu": backend.find_gpu() if variant.startswith("cuda") else None,
         }
+
+
+def versions_here() -> dict[str, str]:
+    """Versions that decide the pixels, by package. After the variant is selected."""
+    from gibench.rendering import backend
+
+    versions = {"gibench": gibench.__version__}
+    versions |= {name: importlib.metadata.version(name) for name in GENERATING}
+    return versions | backend.versions()
 
 
 def frame_seed(recipe: Recipe, room: int, view: int) -> int:

@@ -142,6 +142,9 @@ def _problems(frames: Any, columns: dict[str, str]) -> Iterator[str]:
             yield f"its column {name} has a number that no image has"
     if not frames["fov"].between(0, math.pi, inclusive="neither").all():
         yield "its column fov has an angle that no camera has"
+    for split in frames["split"].unique():
+        if not gate.is_name(split):
+            yield f"its column split holds {shown(str(split))}, which is no name"
     strange = frames["file"][~frames["file"].str.fullmatch(FILE)]
     if len(strange):
         yield f"its column file leads to {shown(str(strange.iloc[0]))}, which is no frame of a dataset"

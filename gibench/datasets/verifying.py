@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import io
+import math
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,9 +19,19 @@ from gibench.datasets.cache import cache_faults
 from gibench.datasets.errors import DatasetError, StorageError
 from gibench.datasets.exr import decode, is_radiance, total_of_parts
 from gibench.datasets.exr_header import HeaderError, read_header
-from gibench.datasets.folder import ENVIRONMENTS, MANIFEST, PREVIEW, TABLE, whole_rooms
+from gibench.datasets.folder import CARD, ENVIRONMENTS, MANIFEST, PREVIEW, TABLE, whole_rooms
 from gibench.datasets.lightings import kept_panorama
-from gibench.datasets.manifest import frame_table, read_manifest, recipe_of, room_record
+from gibench.datasets.manifest import (
+    frame_table,
+    other_values,
+    read_manifest,
+    recipe_of,
+    records_digest,
+    rejections_of,
+    room_record,
+    short,
+    totals_of,
+)
 from gibench.datasets.recipes import Recipe
 from gibench.datasets.table import read_table
 from gibench.errors import GibenchError
@@ -40,8 +52,9 @@ class Problem:
 def verify(root: Path, on_room: Callable[[int, int], None] = lambda done, of: None) -> list[Problem]:
     """Check a whole dataset; an empty list says that nothing is wrong.
 
-    Hashes of all files, completeness against the recipe, and for each frame: channels, types, resolution,
-    finite values, no negative radiance, and `color` equal to the sum of its five parts to the last bit.
+    Hashes of all files, completeness against the recipe, the recipe against what the dataset was begun with, totals
+    against the rooms, and for each frame: channels, types, resolution, finite values, no negative radiance, and `color`
+    equal to the sum of its five parts to the last bit.
     on_room: called with (rooms checked, rooms in all). Raises `DatasetError` when the folder is no dataset
     at all.
     """
@@ -72,11 +85,68 @@ def verify(root: Path, on_room: Callable[[int, int], None] = lambda done, of: No
     on_room(len(expected), len(expected))
     problems.extend(_panorama_problems(root, records))
     problems.extend(_table_problems(root, records, recipe))
+    problems.extend(Problem(MANIFEST, what) for what in _contradictions(manifest, recipe))
     if len(records) == len(expected):
         problems.extend(Problem(*fault) for fault in cache_faults(root, frame_table(records, recipe)))
-    if not (root / PREVIEW).is_file():
-        problems.append(Problem(PREVIEW, "the contact sheet is missing: `gibench dataset preview` makes it"))
+        if manifest["complete"]:
+            problems.extend(Problem(MANIFEST, what) for what in _wrong_sums(manifest, records, recipe))
+    problems.extend(_page_problems(root, manifest))
     return problems
+
+
+def _contradictions(manifest: Mapping[str, Any], recipe: Recipe) -> Iterator[str]:
+    """Say where the recipe is not the one that the dataset was begun with. Files count by their names alone."""
+    there = {key: value for key, value in manifest["identity"].items() if key not in recipe.keys_of_files}
+    for key, (begun, now) in other_values(there, recipe.identity(files=False)).items():
+        yield f"its recipe contradicts its identity ({key}: {short(now)} in one, {short(begun)} in the other)"
+    for key in sorted(recipe.keys_of_files - manifest["identity"].keys()):
+        yield f"its recipe contradicts its identity ({key} is in one of them only)"
+
+
+def _wrong_sums(
+    manifest: Mapping[str, Any], records: Sequence[Mapping[str, Any]], recipe: Recipe
+) -> Iterator[str]:
+    """Say what a complete dataset sums up of its rooms, and they say otherwise. Older versions summed up less."""
+    summed = manifest.get("totals")
+    if summed is None:
+        yield "it has no totals, though it is complete"
+        return
+    totals = totals_of(records, frame_table(records, recipe), recipe)
+    del totals["denoise_changes"]  # those above a limit that versions may move
+    for key, found in totals.items():
+        if key in summed and not _same(summed[key], found):
+            yield f"its total of {key} is {short(summed[key])}, the rooms have {short(found)}"
+    if manifest.get("rejections") not in (None, rejections_of(records)):
+        yield "its rejections are not those of the rooms"
+    if manifest.get("records") not in (None, records_digest(records)):
+        yield "a frames.json of its rooms is not what it was when the dataset was whole"
+
+
+def _same(there: Any, found: Any) -> bool:
+    """Whether values are equal, numbers but for the order in which they were summed."""
+    if isinstance(found, dict) and isinstance(there, dict):
+        return there.keys() == found.keys() and all(_same(there[key], found[key]) for key in found)
+    if isinstance(found, float) and isinstance(there, int | float):
+        return math.isclose(there, found, rel_tol=1e-9)
+    return bool(there == found)
+
+
+def _page_problems(root: Path, manifest: Mapping[str, Any]) -> Iterator[Problem]:
+    """What is wrong with the pages for people. Older versions wrote no card."""
+    from PIL import Image
+
+    try:
+        Image.open(io.BytesIO(gate.read_inside(root, PREVIEW)), formats=["png"]).verify()
+    except gate.GateError as problem:
+        what = "the contact sheet is missing: `gibench dataset preview` makes it"
+        yield Problem(PREVIEW, what if problem.missing else str(problem))
+    except Exception:  # Pillow raises whatever a broken part made it stumble over
+        yield Problem(PREVIEW, "the contact sheet is damaged: `gibench dataset preview` makes it anew")
+    if manifest.get("card") and not (root / CARD).is_file():
+        yield Problem(
+            CARD,
+            f"the card is missing: remove {TABLE} and run `{manifest['command']}`, which writes both anew",
+        )
 
 
 def _room_problems(root: Path, record: Mapping[str, Any], recipe: Recipe, room: int) -> Iterator[Problem]:

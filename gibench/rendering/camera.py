@@ -141,7 +141,7 @@ class RayGenerator:
     """Rays of a camera, with its numbers kept out of the compiled kernel, so that one kernel serves all frames.
 
     origin: mi.Point3f, m. axes: unit mi.Vector3f, as `PinholeCamera.frame`. scale: mi.Float, size of a pixel over its
-    depth. centre: mi.Vector2f, where the optical axis meets the film, pixels.
+    depth. centre: mi.Vector2f, where the optical axis meets the film, pixels. size: mi.Vector2f, of the film, pixels.
     """
 
     def __init__(self, camera: PinholeCamera, resolution: tuple[int, int]) -> None:
@@ -155,21 +155,28 @@ class RayGenerator:
         self.axes = [mi.Vector3f(row.tolist()) for row in camera.frame]
         self.scale = mi.Float(1 / focal)
         self.centre = mi.Vector2f(*camera.centre(resolution))
+        self.size = mi.Vector2f(*map(float, resolution))
         if not is_scalar():
-            dr.make_opaque(self.origin, self.axes, self.scale, self.centre)
+            dr.make_opaque(self.arrays)
 
     @classmethod
     def of(cls, arrays: dict[str, Any]) -> RayGenerator:
         """The generator whose `arrays` these are."""
         generator = object.__new__(cls)
         generator.origin, generator.axes = arrays["origin"], arrays["axes"]
-        generator.scale, generator.centre = arrays["scale"], arrays["centre"]
+        generator.scale, generator.centre, generator.size = arrays["scale"], arrays["centre"], arrays["size"]
         return generator
 
     @property
     def arrays(self) -> dict[str, Any]:
         """What `of` makes it from again; see `replay.HoldsArrays`."""
-        return {"origin": self.origin, "axes": self.axes, "scale": self.scale, "centre": self.centre}
+        return {
+            "origin": self.origin,
+            "axes": self.axes,
+            "scale": self.scale,
+            "centre": self.centre,
+            "size": self.size,
+        }
 
     @property
     def forward(self) -> Any:

@@ -86,7 +86,7 @@ def _motion(hit: Hit, pixel: Any, previous: RayGenerator | None) -> tuple[Any, A
     offset = mi.Vector2f(film - pixel)
     ahead &= dr.all(dr.isfinite(offset))
     offset = dr.select(ahead, offset, 0)
-    inside = ahead & dr.all((film >= 0) & (film < 2 * previous.centre))
+    inside = ahead & dr.all((film >= 0) & (film < previous.size))
     origin = previous.origin
     towards = hit.si.p - origin
     distance = dr.norm(towards)

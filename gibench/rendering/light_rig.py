@@ -1,7 +1,8 @@
 """A loaded scene that changes its light without compiling anything.
 
 A rig puts one rectangle and one panorama into a scene and from then on changes their numbers alone. These are kept out
-of the compiled code, so kernels and recordings serve every pose, every radiance and every panorama of one size.
+of the compiled code, so kernels serve every pose, every radiance and every panorama of one size, and recordings those
+of one kind of light.
 """
 
 from __future__ import annotations
@@ -40,23 +41,28 @@ class Lights:
     """The lighting of a scene now, as arrays that kernels read.
 
     lighting: as it was set. centre: mi.Point3f of an area light, m. placed: mi.Float, 1 where there is one, else 0.
+    weights: by which each light of the scene is chosen, in Mitsuba's order.
     """
 
-    def __init__(self) -> None:
-        """The scene's own light."""
-        self.show(Lighting())
+    def __init__(self, mi_scene: Any) -> None:
+        """The scene's own light. mi_scene: the `mitsuba.Scene`."""
+        self.show(Lighting(), mi_scene)
 
-    def show(self, lighting: Lighting) -> None:
-        """Take another lighting."""
+    def show(self, lighting: Lighting, mi_scene: Any) -> None:
+        """Take another lighting, which the scene has already."""
         self.lighting = lighting
+        self.weights = tuple(float(emitter.sampling_weight()) for emitter in mi_scene.emitters())
         self.centre = mi.Point3f(list(lighting.area.centre) if lighting.area else [0.0] * 3)
         self.placed = mi.Float(1.0 if lighting.area else 0.0)
         _keep_out(self.centre, self.placed)
 
     @property
     def arrays(self) -> dict[str, Any]:
-        """What kernels read; see `replay.HoldsArrays`."""
-        return {"centre": self.centre, "placed": self.placed}
+        """What kernels read; see `replay.HoldsArrays`.
+
+        Mitsuba's code for the density of a light sample reads the weights as numbers.
+        """
+        return {"centre": self.centre, "placed": self.placed, "weights": self.weights}
 
 
 @dataclass
@@ -111,7 +117,7 @@ class LightRig:
             part.set_id({**names, RECTANGLE: name, SKY: ENVIRONMENT}[key])
         handle = wrap(lit, last=name)
         self._lit = {lamp.weight: True for lamp in self._lamps}
-        self.scene = replace(handle, openings=scene.openings, lights=Lights(), _beside=scene._beside)
+        self.scene = replace(handle, openings=scene.openings, lights=Lights(lit), _beside=scene._beside)
         self.lighting: Lighting | None = None
         self.set(Lighting())
 
@@ -135,9 +141,10 @@ class LightRig:
     def set(self, lighting: Lighting) -> None:
         """Light the scene by this alone. Nothing is done where it does so already.
 
-        Kernels and recordings stay as they are, but for a panorama of another size than the one before it. Raises
-        LightingError for an environment where the rig was made without, and for the scene's own light where that has an
-        environment that a panorama cannot stand for.
+        Kernels stay as they are, but for a panorama of another size than the one before it. So do recordings, of which
+        each kind of light has its own: which lights are drawn is part of them. Raises LightingError for an environment
+        where the rig was made without, and for the scene's own light where that has an environment that a panorama
+        cannot stand for.
         """
         if lighting == self.lighting:
             return
@@ -152,7 +159,7 @@ class LightRig:
         self._switch(lighting.kind == "own", lighting.area is not None, sky)
         self._parameters.update()
         make_tables(self.scene.mi_scene)
-        self.scene.lights.show(lighting)
+        self.scene.lights.show(lighting, self.scene.mi_scene)
         if self.scene.portals is not None:
             by_own = self._own_sky is None and lighting.kind == "own"
             self.scene.portals.open(sky or by_own)

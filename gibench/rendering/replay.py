@@ -50,7 +50,7 @@ class Replay:
         guide = [] if scene.guide is None else arrays_of(scene.guide)
         kinds = _kinds(str(mi.variant()))
         self._held = [scene.mi_scene, scene.tables, scene.layers.arrays, guide, kinds, held]
-        # Their arrays are others after a change of the light.
+        # Their arrays are others after a change of the light, and with another kind of light their numbers.
         self._changing = [thing for thing in (scene.portals, scene.lights) if thing is not None]
         for thing in self._changing:
             arrays_of(thing)
@@ -85,7 +85,10 @@ class HoldsArrays(Protocol):
 
     @property
     def arrays(self) -> Any:
-        """Its Dr.Jit arrays now, a pytree of lists and dictionaries."""
+        """Its Dr.Jit arrays now, a pytree of lists and dictionaries.
+
+        Python numbers among them tell recordings apart: those that kernels bake in.
+        """
 
 
 def arrays_of(thing: HoldsArrays) -> Any:

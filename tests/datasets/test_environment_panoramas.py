@@ -1,12 +1,15 @@
 """Panoramas of rooms: they look where they should, and the same command continues."""
 
+import importlib.metadata
+import json
+
 import numpy as np
 import pytest
 
 from gibench.datasets.environment_panoramas import make_environments, panorama_from, room_seed
 from gibench.datasets.errors import FolderError
 from gibench.generators.environments.files import environment_files, read_environment
-from gibench.rendering.backend import select_variant
+from gibench.rendering.backend import VARIANTS, select_variant
 from gibench.rendering.latlong import directions, for_envmap
 
 
@@ -62,6 +65,34 @@ def test_a_folder_of_something_else_is_left_alone(tmp_path):
     (tmp_path / "maps" / "environments.json").write_text("{")
     with pytest.raises(FolderError, match="is damaged"):
         make_environments(tmp_path / "maps", count=1, seed=0, spp=1, height=16)
+
+
+def test_what_a_killed_run_leaves_of_its_record_stops_nothing(tmp_path):
+    (tmp_path / ".environments.json.partial-1230000099").write_text("{")
+    assert len(make_environments(tmp_path, count=1, seed=5, spp=1, height=16)) == 1
+
+
+def test_panoramas_of_another_variant_or_other_versions_are_not_mixed_in(tmp_path):
+    settings = {"count": 1, "seed": 5, "spp": 1, "height": 16}
+    record = tmp_path / "environments.json"
+    make_environments(tmp_path, **settings)
+    made = json.loads(record.read_text())
+    assert made["variant"] in VARIANTS
+    assert made["versions"]["mitsuba"] == importlib.metadata.version("mitsuba")
+    for key, other in (
+        ("variant", "scalar_rgb"),
+        ("versions", {**made["versions"], "mitsuba": "0"}),
+    ):
+        record.write_text(json.dumps({**made, key: other}))
+        with pytest.raises(
+            FolderError, match=r"was begun with something else \((variant: scalar_rgb|mitsuba: 0) there"
+        ):
+            make_environments(tmp_path, **settings | {"count": 2})
+        assert len(list(tmp_path.iterdir())) == 2
+    # What an older version began goes on.
+    record.write_text(json.dumps({"seed": 5, "spp": 1, "height": 16}))
+    assert len(make_environments(tmp_path, **settings | {"count": 2})) == 2
+    assert json.loads(record.read_text()) == {"seed": 5, "spp": 1, "height": 16}
 
 
 def test_no_dataset_has_the_rooms():

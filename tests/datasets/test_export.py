@@ -242,6 +242,15 @@ def test_huggingface(rooms, tmp_path_factory, capsys):
     assert sorted(path.name for path in out.iterdir()) == ["README.md", "data"]
 
 
+def test_a_split_that_the_library_would_not_load_is_refused(rooms, tmp_path):
+    pytest.importorskip("datasets")
+    dataset = open_dataset(rooms)
+    dataset.frames["split"] = "un-seen"
+    with pytest.raises(DatasetError, match="split 'un-seen' cannot be read by the library datasets"):
+        export(dataset, "huggingface", tmp_path / "out")
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.parametrize("to", sorted(FORMATS))
 def test_some_channels_of_one_split(rooms, to, tmp_path):
     """A frame without positions or light can be written too."""
@@ -273,6 +282,24 @@ def test_refusals_leave_nothing_behind(rooms, tmp_path, capsys):
         == 2
     )
     assert capsys.readouterr().err.startswith("error: ")
+
+
+@pytest.mark.parametrize(
+    ("channel", "says"),
+    [
+        ("surfaces", "unknown channel or set 'surfaces': did you mean surface"),
+        ("motion", "no channel 'motion'"),
+    ],
+)
+@pytest.mark.parametrize("words", [["cache"], ["export", "--to", "webdataset", "--out", "out"]])
+def test_channels_that_are_not_there_are_a_mistake(
+    rooms, tmp_path, monkeypatch, capsys, words, channel, says
+):
+    monkeypatch.chdir(tmp_path)
+    command, *more = words
+    assert run(app, ["dataset", command, str(rooms), "--channels", channel, *more]) == 2
+    assert says in " ".join(capsys.readouterr().err.split())
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_an_export_that_is_stopped_leaves_nothing(rooms, tmp_path):

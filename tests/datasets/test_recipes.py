@@ -1,8 +1,10 @@
+import json
 from pathlib import Path
 
 import pytest
 
-from gibench.datasets.errors import RecipeError
+from gibench.datasets.errors import FolderError, RecipeError
+from gibench.datasets.manifest import refuse_other
 from gibench.datasets.recipes import Recipe, check_recipe, load_preset, load_recipe, preset_names
 from gibench.rendering.channels import resolve
 
@@ -52,6 +54,28 @@ def test_identity_leaves_out_the_number_of_rooms_and_takes_files_by_content(tmp_
     assert a == b != c
 
 
+@pytest.mark.parametrize(
+    ("key", "values"),
+    [
+        ("splits", {"train": 0.5, "test": 0.5}),
+        ("sequences", {"a": {"views": 2}, "b": {"views": 2}}),
+        ("environments", ["aerodynamics_workshop", "autoshop_01"]),
+    ],
+)
+def test_the_order_of_tables_is_part_of_the_identity(tmp_path, key, values):
+    light = {"lighting": "environments"} if key == "environments" else {}
+    turned = values[::-1] if isinstance(values, list) else dict(reversed(values.items()))
+    one, other = (check_recipe({**light, key: table}) for table in (values, turned))
+    assert one != other
+    assert one == check_recipe({**light, key: values})
+    manifest = {"identity": one.identity(), "recipe": one.model_dump(mode="json"), "command": "make-dataset"}
+    manifest = json.loads(json.dumps(manifest))
+    refuse_other(tmp_path, manifest, one)
+    refuse_other(tmp_path, manifest, Recipe.model_validate(manifest["recipe"]))
+    with pytest.raises(FolderError, match=f"holds another dataset .order of {key}: "):
+        refuse_other(tmp_path, manifest, other)
+
+
 def test_a_recipe_survives_json():
     recipe = load_preset("paper")
     assert Recipe.model_validate(recipe.model_dump(mode="json")) == recipe
@@ -74,12 +98,20 @@ def test_a_recipe_survives_json():
         ("spp = 4\nerror = 0.1", "spp and error are both set"),
         ("spp = 1", "color_se needs spp from 2 on; raise spp, or name channels without color_se"),
         ("error = 0.1\nspp_cap = 63", "spp_cap: 63 is not allowed; allowed is an integer from 64"),
+        (
+            'error = 0.1\nchannels = ["radiance_cue_2", "depth"]',
+            "radiance cues need spp where no radiance is asked for: give it in place of error",
+        ),
         ("splits = {train = nan}", "the shares do not sum to 1"),
         ("splits = {train = 2.0, test = -1.0}", "the shares do not sum to 1"),
         ("roms = 4", "unknown key 'roms'; did you mean 'rooms'"),
         ('path = "fly"', 'path: \'fly\' is not allowed; allowed is "stills", "walk"'),
         ("splits = {train = 0.5}", "the shares do not sum to 1"),
         ("splits = {train = 1.5, test = -0.5}", "the shares do not sum to 1"),
+        ('splits = {"../../escaped" = 1.0}', "'../../escaped' is no name: letters, digits and _"),
+        ('splits = {"a/b" = 0.5, test = 0.5}', "'a/b' is no name"),
+        ('splits = {"50%" = 1.0}', "'50%' is no name"),
+        ('splits = {"" = 1.0}', "'' is no name"),
         ('environment = "sunsk"', "there is no file"),
         ("rooms = ", "is no valid TOML"),
     ],
@@ -102,6 +134,9 @@ def test_wrong_options_are_named_as_options():
         load_preset("small", {"kinds": ("kitchen",)})
     with pytest.raises(RecipeError, match="both set"):
         load_preset("small", {"spp": 4, "error": 0.1})
+    with pytest.raises(RecipeError, match=r"^--error: radiance cues need spp"):
+        load_preset("small", {"error": 0.1, "channels": ("lighting",)})
+    assert load_preset("small", {"error": 0.1, "channels": ("lighting", "color")}).error == 0.1
 
 
 def test_missing_files_and_presets():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 
@@ -201,6 +202,33 @@ def test_converting_says_what_was_done_and_can_be_done_again(tmp_path, capsys):
     assert run(app, ["convert", str(tmp_path / "new/scene.xml"), "--out", str(tmp_path / "again")]) == 0
     assert "new: z up, 0 changes" in capsys.readouterr().out
     assert "is there already" in refused(capsys, "convert", old, "--out", tmp_path / "new", to=app)
+
+
+@pytest.mark.parametrize(
+    ("failure", "code", "says"),
+    [
+        (OSError(errno.ENOSPC, "No space left on device"), 2, "cannot be written: No space left on device"),
+        (KeyboardInterrupt(), 130, ""),
+    ],
+)
+def test_a_conversion_appears_whole_or_not_at_all(scene, tmp_path, capsys, monkeypatch, failure, code, says):
+    out = tmp_path / "out" / "new"
+    out.parent.mkdir()
+
+    def failing(*_: object) -> None:
+        assert not out.exists()  # as it would be found after SIGKILL
+        raise failure
+
+    with monkeypatch.context() as patched:
+        patched.setattr("gibench.generators.imported.room.write_scene_glb", failing)
+        assert run(app, ["convert", str(scene), "--out", str(out)]) == code
+    assert says in " ".join(capsys.readouterr().err.split())
+    assert list(out.parent.iterdir()) == []
+    out.mkdir()  # an empty folder will do as well
+    assert run(app, ["convert", str(scene), "--out", str(out)]) == 0
+    assert (out / "scene.xml").is_file()
+    assert (out / "room.glb").is_file()
+    assert list(out.parent.iterdir()) == [out]
 
 
 def test_a_scene_without_a_place_for_cameras_does_not_stop_the_others(scene, tmp_path, capsys):

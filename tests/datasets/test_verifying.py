@@ -12,11 +12,12 @@ from gibench.cli import run
 from gibench.cli.app import app
 from gibench.datasets import open_dataset
 from gibench.datasets.exr import encode, layer_names, stored_types
+from gibench.datasets.making import make
 from gibench.datasets.manifest import gathered, read_manifest, write_manifest, write_table
 from gibench.datasets.verifying import frame_faults, verify
-from gibench.rendering.channels import CHANNELS
+from gibench.rendering.channels import CHANNELS, SETS
 from gibench.rendering.machine import processor
-from tests.datasets.fakes import pixels, tiny
+from tests.datasets.fakes import fake_work, pixels, tiny
 
 
 @pytest.fixture
@@ -90,6 +91,86 @@ def test_a_table_that_says_something_else_is_found(copy):
     assert "damaged" in broken(copy)["frames.parquet"]
     (copy / "frames.parquet").unlink()
     assert "missing" in broken(copy)["frames.parquet"]
+
+
+def test_damaged_pages_are_found(copy):
+    content = bytearray((copy / "preview.png").read_bytes())
+    content[len(content) // 2] ^= 1
+    (copy / "preview.png").write_bytes(content)
+    (copy / "DATASET.md").unlink()
+    found = broken(copy)
+    assert set(found) == {"preview.png", "DATASET.md"}
+    assert "is damaged: `gibench dataset preview` makes it anew" in found["preview.png"]
+    (copy / "preview.png").write_bytes(content[:100])
+    assert "is damaged" in broken(copy)["preview.png"]
+    assert "run `make-dataset --rooms 12`, which writes both anew" in found["DATASET.md"]
+    (copy / "frames.parquet").unlink()
+    recipe = tiny(12, channels=tuple(SETS))
+    make(copy, recipe, command="make-dataset --rooms 12", work=fake_work(copy, recipe))
+    assert broken(copy) == {}
+
+
+def changed_manifest(root: Path, **changes) -> None:
+    path = root / "dataset.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | changes))
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "says"),
+    [
+        ("seed", 5, "seed: 5 in one, 0 in the other"),
+        ("max_depth", 3, "max_depth: 3 in one, 8 in the other"),
+        ("gloss", "much", 'gloss: "much" in one, null in the other'),
+        ("environment", "none", 'environment: "none" in one, "auto" in the other'),
+        ("splits", {"validation": 0.1, "train": 0.8, "test": 0.1}, 'order of splits: ["validation", '),
+    ],
+)
+def test_a_recipe_that_contradicts_the_identity_is_found(copy, key, value, says):
+    manifest = read_manifest(copy)
+    changed_manifest(copy, recipe=manifest["recipe"] | {key: value})
+    assert f"its recipe contradicts its identity ({says}" in broken(copy)["dataset.json"]
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("frames", 23),
+        ("paths", 1),
+        ("kernel_seconds", 5.0),
+        ("splits", {"train": 24}),
+        ("median_error", None),
+    ],
+)
+def test_wrong_totals_are_found(copy, key, value):
+    manifest = read_manifest(copy)
+    changed_manifest(copy, totals=manifest["totals"] | {key: value})
+    found = broken(copy)
+    assert set(found) == {"dataset.json"}
+    assert found["dataset.json"].startswith(f"its total of {key} is ")
+    changed_manifest(copy, totals=None)
+    assert "no totals" in broken(copy)["dataset.json"]
+    changed_manifest(copy, totals=manifest["totals"], rejections={"view: too dark": 11})
+    assert broken(copy) == {"dataset.json": "its rejections are not those of the rooms"}
+
+
+@pytest.mark.parametrize("names", ["materials", "shapes"])
+def test_names_in_another_order_are_found(copy, names):
+    path = copy / "rooms/000003/frames.json"
+    record = json.loads(path.read_text())
+    path.write_text(json.dumps({**record, names: [*record[names], "one more"][::-1]}))
+    assert broken(copy) == {
+        "dataset.json": "a frames.json of its rooms is not what it was when the dataset was whole"
+    }
+
+
+def test_datasets_of_older_versions_are_whole(copy):
+    manifest = read_manifest(copy)
+    del manifest["records"], manifest["card"], manifest["rejections"]
+    for key in ("processors", "denoise_changes"):
+        del manifest["totals"][key]
+    write_manifest(copy, manifest)
+    (copy / "DATASET.md").unlink()
+    assert verify(copy) == []
 
 
 def faults(**changed: np.ndarray) -> list[str]:

@@ -197,6 +197,19 @@ def test_positions_and_motion_of_a_rolled_off_centre_camera_are_those_of_its_pro
     np.testing.assert_allclose(frame["depth"][..., 0], depth, rtol=1e-5)
     x, y, _ = before.project(position, size)
     np.testing.assert_allclose(frame["motion"], np.stack([x, y], -1) - centres, atol=2e-3)
+    inside = (x >= 0) & (x < 40) & (y >= 0) & (y < 30)
+    assert inside.any()
+    assert not inside.all()
+    np.testing.assert_array_equal(frame["motion_valid"][..., 0], inside)
+
+
+@pytest.mark.parametrize("principal_point", [(0.25, 0.0), (-0.6, 0.0), (0.1, -2.0)])
+def test_all_that_an_off_centre_camera_sees_is_valid_where_nothing_moves(principal_point):
+    wall = scenes.rectangle([0, 3, 0], [0, -1, 0], (40, 40))
+    camera = PinholeCamera((0, 0, 0), (0, 1, 0), 1.0, principal_point=principal_point)
+    frame = gbuffer({"type": "scene", "wall": wall}, camera, (16, 8), ["motion"], previous_camera=camera)
+    np.testing.assert_allclose(frame["motion"], 0, atol=1e-4)
+    np.testing.assert_array_equal(frame["motion_valid"], 1)
 
 
 def test_motion_is_not_valid_where_the_point_was_hidden():

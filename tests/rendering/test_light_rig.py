@@ -129,7 +129,32 @@ def test_the_scenes_own_light_is_given_back():
         np.testing.assert_array_equal(value, before[name], err_msg=name)
 
 
-def test_moves_and_swaps_compile_no_kernel_and_record_nothing_anew():
+@pytest.mark.parametrize("sky", [False, True], ids=["lamps", "lamps and sky"])
+def test_after_every_change_of_kind_frames_are_those_of_a_new_recording(sky):
+    # Nothing is loaded in between: that would have everything recorded anew.
+    own = {**box("coat"), "bulb": {"type": "point", "position": [0.5, 0, 1.5], "intensity": rgb(0.3)}}
+    if sky:
+        own["sky"] = {"type": "constant", "radiance": rgb(0.4, 0.5, 0.6)}
+    rig = LightRig(load_dict(own))
+    order = [{"own": Lighting(), "area": AREA[0], "sky": SKIES[0]}[kind] for kind in _EVERY_CHANGE]
+
+    def frame(scene):
+        return image(scene, side=16, spp=16)
+
+    replayed = []
+    for lighting in order:
+        rig.set(lighting)
+        replayed.append(frame(rig.scene))
+    for lighting, seen in zip(order, replayed, strict=True):
+        rig.set(lighting)
+        for name, value in frame(replace(rig.scene)).items():
+            np.testing.assert_array_equal(seen[name], value, err_msg=name)
+
+
+_EVERY_CHANGE = ("own", "area", "sky", "own", "sky", "area", "own")
+
+
+def test_moves_and_swaps_compile_no_kernel_and_record_each_kind_once():
     gc.collect()  # scenes of other tests that die in between change what kernels call
     rig = LightRig(load_dict(box("metal")))
 
@@ -153,10 +178,11 @@ def test_moves_and_swaps_compile_no_kernel_and_record_nothing_anew():
         for number in range(51):
             rig.set(moved(number))
             seen.append(frame())
+        assert [kernel.recordings for kernel in rig.scene.replays.values()] == [2, 2]
         rig.set(Lighting())
         frame()
     assert compiled == [0]
-    assert [kernel.recordings for kernel in rig.scene.replays.values()] == [1, 1]
+    assert [kernel.recordings for kernel in rig.scene.replays.values()] == [3, 3]
     assert len(set(seen)) == 51
 
 

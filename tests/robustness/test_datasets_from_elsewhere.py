@@ -317,6 +317,21 @@ def test_commands_print_through_one_door():
         )
 
 
+@pytest.mark.parametrize("split", ["../../escaped", "a/b", "50%", ""])
+def test_splits_that_are_no_names_are_refused(ds, split):
+    manifest, record = (
+        json.loads((ds / name).read_text()) for name in ("dataset.json", f"{ROOM}/frames.json")
+    )
+    (ds / ROOM / "frames.json").write_bytes(as_json({**record, "split": split}))
+    assert f"is damaged (split: {split!r} is no name" in problems(ds)[f"{ROOM}/frames.json"]
+    pd.read_parquet(ds / "frames.parquet").assign(split=split).to_parquet(ds / "frames.parquet", index=False)
+    with pytest.raises(DatasetError, match=f"its column split holds {split!r}, which is no name"):
+        open_dataset(ds)
+    edited(ds / "dataset.json", recipe={**manifest["recipe"], "splits": {split: 1.0}})
+    with pytest.raises(DatasetError, match=f"splits: {split!r} is no name"):
+        open_dataset(ds)
+
+
 def test_columns_of_later_versions_are_filled(ds):
     table = pd.read_parquet(ds / "frames.parquet").drop(columns="denoise_change")
     table.to_parquet(ds / "frames.parquet", index=False)

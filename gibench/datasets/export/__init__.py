@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import importlib
-import os
-import shutil
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from gibench.datasets.errors import DatasetError, FolderError, nearest
-from gibench.datasets.files import sync_tree
+from gibench.datasets.files import whole_folder
 from gibench.datasets.loading import Dataset
 
 Tell = Callable[[int, int], None]
@@ -50,15 +48,9 @@ def export(
     out = Path(out)
     if out.exists():
         raise FolderError(f"{out} exists: choose a new folder with --out")
-    partial = out.with_name(f".{out.name}.partial-{os.getpid()}")
-    shutil.rmtree(partial, ignore_errors=True)
     try:
-        partial.mkdir(parents=True)
-        write(dataset, tuple(channels), partial, tell)
-        sync_tree(partial)
-        partial.rename(out)
+        with whole_folder(out) as partial:
+            write(dataset, tuple(channels), partial, tell)
     except OSError as problem:
         raise FolderError(f"{out} cannot be written: {problem.strerror or problem}") from None
-    finally:
-        shutil.rmtree(partial, ignore_errors=True)
     return out

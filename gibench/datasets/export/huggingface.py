@@ -6,6 +6,7 @@ matrices, and the columns of `frames.parquet`.
 
 from __future__ import annotations
 
+import re
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -17,6 +18,7 @@ import yaml
 from PIL import Image
 
 from gibench.datasets.card import channel_table
+from gibench.datasets.errors import DatasetError
 from gibench.datasets.export.frames import picture, row_of
 from gibench.datasets.loading import Dataset
 from gibench.rendering.channels import CHANNELS
@@ -24,17 +26,29 @@ from gibench.rendering.channels import CHANNELS
 SHARD_BYTES = 500e6
 """Size before compression after which the next file of a split begins."""
 
+SPLIT = r"\w+(\.\w+)*"
+"""Names of splits that the library takes (`datasets.naming`)."""
+
 #: What a hub calls the licences that a recipe may name; others are "other".
 LICENCES = {"CC0-1.0": "cc0-1.0", "CC-BY-4.0": "cc-by-4.0", "CC-BY-3.0": "cc-by-3.0"}
 
 
 def write(dataset: Dataset, channels: tuple[str, ...], out: Path, tell: Any) -> None:
-    """Write `README.md` and `data/SPLIT-00000-of-00001.parquet`."""
+    """Write `README.md` and `data/SPLIT-00000-of-00001.parquet`.
+
+    Raises DatasetError for a split that the library would not load.
+    """
     names = channels or dataset[0].channels
     width, height = int(dataset.frames["width"].iloc[0]), int(dataset.frames["height"].iloc[0])
+    done, splits = 0, list(dict.fromkeys(dataset.frames["split"]))
+    for split in splits:
+        if not re.fullmatch(SPLIT, split):
+            raise DatasetError(
+                f"split '{split}' cannot be read by the library datasets: its names are letters, digits and _ with "
+                "single dots between; export to webdataset, or name the split otherwise in the recipe"
+            )
     features = _features(dataset, names, (width, height))
     (out / "data").mkdir()
-    done, splits = 0, list(dict.fromkeys(dataset.frames["split"]))
     for split in splits:
         part = dataset.split(split)
 
