@@ -398,8 +398,8 @@ class Recipe(BaseModel):
         """Return the recipe as JSON-able values without the number of rooms, which alone may grow.
 
         Files count by their content (SHA-256), not by where they lie. The order of tables counts (`other_values` of
-        `gibench.datasets.manifest` compares it), as JSON keeps it. files: whether they are read; `keys_of_files` are left
-        out otherwise. Raises `RecipeError` or `SceneFileError` for a file that cannot be read.
+        `gibench.datasets.manifest` compares it), as JSON keeps it. files: whether they are read; `keys_of_files` are
+        left out otherwise. Raises `RecipeError` or `SceneFileError` for a file that cannot be read.
         """
         values = self.model_dump(mode="json", exclude={"rooms"})
         # Datasets that were begun before these keys existed hold the same frames.
