@@ -246,15 +246,16 @@ class Prediction:
         """color: all of the light. specular: what the first hit reflects by its specular lobe, direct and indirect.
 
         indirect: what comes to the first hit from other surfaces, by both lobes. None where the method cannot tell a
-        part apart. extra: numbers worth a column, such as the samples that were spent; or a function that works them
-        out, which is called like images are copied, once the clock has stopped.
+        part apart. A part that no frame shows, but that is scored, may be a function that works it out: it is called
+        once the clock has stopped, as images are copied. extra: numbers worth a column, such as the samples that were
+        spent, or a function for them likewise.
         """
         self._images = {"color": color, "specular": specular, "indirect": indirect}
         self._extra = extra or {}
 
     def finish(self) -> None:
         """Have the device compute what of the images it has put off. Part of a frame's time."""
-        evaluate([image for image in self._images.values() if image is not None])
+        evaluate([image for image in self._images.values() if image is not None and not callable(image)])
 
     @cached_property
     def extra(self) -> dict[str, float]:
@@ -278,7 +279,9 @@ class Prediction:
 
 
 def on_host(image: Any) -> Any:
-    """An array of any library as one of NumPy; None stays None."""
+    """An array of any library, or what a function makes, as one of NumPy; None stays None."""
+    if callable(image):
+        image = image()
     torch = sys.modules.get("torch")
     if torch is not None and isinstance(image, torch.Tensor):
         return image.detach().cpu().numpy()

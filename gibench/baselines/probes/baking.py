@@ -27,7 +27,7 @@ from gibench.baselines.probes.mappings import ADAPTIVE, MAPPINGS, LatLong, Octah
 from gibench.baselines.probes.narrowed import NarrowedMaterials
 from gibench.datasets.exr import fits_half
 from gibench.rendering import surface
-from gibench.rendering.denoise import denoise
+from gibench.rendering.denoise import denoise_part
 from gibench.rendering.gbuffer import Hit
 from gibench.rendering.integrator import scatter_paths
 from gibench.rendering.replay import Replay
@@ -252,10 +252,10 @@ def _bake_surfaces(baker: _Baker, part: str, folder: Path) -> None:
 def _denoised(
     radiance: NDArray[np.float32], guides: Mapping[str, NDArray[np.float32]], mapping: LatLong | Octahedral
 ) -> NDArray[np.float32]:
-    """One map (H, W, 3), denoised as if it went on beyond its edges."""
+    """One map (H, W, 3), denoised as if it went on beyond its edges, with the light of its samples kept."""
     height, width = radiance.shape[:2]
     margin = min(MARGIN, width, height)
-    denoised = denoise(
+    denoised = denoise_part(
         mapping.surrounded(radiance, margin),
         **{name: mapping.surrounded(guide, margin) for name, guide in guides.items()},
     )

@@ -116,13 +116,13 @@ class Relit(DirectLight):
         guides: Sequence[NDArray[Any]],
         extra: Callable[[], Mapping[str, float]],
     ) -> Prediction:
-        """Denoise direct light, or all of the light and, where it is scored, indirect light once more."""
+        """Denoise direct light or all of the light, and where it is scored indirect light, outside of the clock."""
         made = indirect.cpu().numpy()
         albedo, normal = guides
         clean = partial(denoise, albedo=albedo, normal=normal)
         if not self._denoise:
             return Prediction(clean(direct) + made, indirect=made, extra=extra)
-        scored = clean(made) if "indirect" in self._scored else None
+        scored = partial(clean, made) if "indirect" in self._scored else None
         return Prediction(clean(direct + made), indirect=scored, extra=extra)
 
 

@@ -122,3 +122,14 @@ def test_stages(box, tmp_path):
         stages = Stages()
         implementation.render(view(scenes.CAMERA), stages)
         assert set(stages.seconds) == names
+
+
+def test_only_what_a_renderer_shows_is_denoised_inside_of_the_clock(box, tmp_path, monkeypatch):
+    asked = []
+    monkeypatch.setattr(tracer, "denoise", lambda image, **guides: asked.append(image) or image)
+    (frame,) = frames(method(box, tmp_path), 1, spp=1, denoise=True)
+    frame.finish()
+    assert len(asked) == 1
+    np.testing.assert_array_equal(frame.color, asked[0])
+    np.testing.assert_array_equal(frame.specular, asked[1])
+    assert len(asked) == 2

@@ -9,6 +9,7 @@ import pytest
 from gibench.baselines.probes import baking
 from gibench.baselines.probes.baking import MAPS, ProbeSettings
 from gibench.baselines.probes.errors import ProbeError
+from gibench.baselines.probes.mappings import LatLong, Octahedral
 from gibench.baselines.probes.maps import load_probes
 from gibench.rendering.camera import PinholeCamera, RayGenerator
 from gibench.rendering.render import render_frame
@@ -245,6 +246,18 @@ def test_denoising_keeps_the_mean_and_removes_noise(tmp_path, name, shape):
     errors = [np.mean((found - maps[2]) ** 2) for found in maps[:2]]
     assert errors[1] < 0.7 * errors[0]
     assert maps[1].mean() == pytest.approx(maps[2].mean(), rel=0.1)
+
+
+@pytest.mark.parametrize("mapping", [LatLong(128, 64), Octahedral(64, 64)])
+def test_denoising_keeps_light_that_few_paths_find(mapping):
+    """The network alone takes such spots for noise and leaves a seventh of the light out."""
+    rng = np.random.default_rng(0)
+    shape = (mapping.height, mapping.width, 3)
+    found = np.where(rng.random((*shape[:2], 1)) < 0.03, rng.gamma(0.5, 20, (*shape[:2], 1)), 0.05)
+    samples = (found * [1, 0.9, 0.8]).astype(np.float32)
+    guides = {"albedo": np.full(shape, 0.5, np.float32), "normal": np.zeros(shape, np.float32)}
+    clean = baking._denoised(samples, guides, mapping)
+    np.testing.assert_allclose(clean.mean(axis=(0, 1)), samples.mean(axis=(0, 1)), rtol=0.05)
 
 
 def test_texels_of_the_same_direction_agree_between_mappings(mirrored, tmp_path):
