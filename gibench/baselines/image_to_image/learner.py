@@ -108,7 +108,7 @@ class IndirectLight(Learner):
                 fused=True,
             )
         self.features = Vgg16Features().to(device) if plan.perceptual else None
-        self.anew_at = LOOKED_FROM if plan.perceptual or plan.adversarial else 0.0
+        self.anew_at = self.CHOSEN_FROM if plan.perceptual or plan.adversarial else 0.0
         super().__init__(networks, optimisers, product=["network"])
 
     def batches(self, processes: int = 0) -> Batches:

@@ -127,7 +127,7 @@ class Predicting(Learner):
         self.network.to(device)
         self.held_out = [Example(*(part.to(device) for part in widened(one))) for one in judged]
         self.lpips = Lpips().to(device) if plan.lpips else None
-        self.anew_at = PERCEPTUAL_FROM if plan.lpips else 0.0
+        self.anew_at = self.CHOSEN_FROM if plan.lpips else 0.0
         optimiser = torch.optim.Adam(self.network.parameters(), lr=RATES[plan.network], fused=True)
         super().__init__({"network": self.network}, {"network": optimiser})
 

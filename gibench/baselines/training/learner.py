@@ -37,9 +37,12 @@ class Learner(ABC):
     """
 
     anew_at = 0.0
-    """Progress at which another loss sets in. Weights of before are given up for those after it, even where these have
-    a larger held-out error: it may not know what the new loss is for.
+    """Progress after which weights are chosen, where another loss set in: those of before are given up for these, even
+    where these have a larger held-out error, which may not know what the new loss is for.
     """
+
+    CHOSEN_FROM = 0.95
+    """Of a loss that sets in late: by then its steps have done their work, and the rate is next to nothing."""
 
     def __init__(
         self,
