@@ -27,6 +27,9 @@ FARTHEST_FLOOR = 30.0
 SMALL = 6.8
 """Points: the type of labels."""
 
+BETWEEN = "  ·  "
+"""Between what is said of a plot below its title."""
+
 LONGEST_LABEL = 48
 """Characters of a name in a plot, which is about 130 of them wide."""
 
@@ -63,10 +66,16 @@ def new_panel(figure: Figure, inches: tuple[float, float, float, float]) -> Axes
 
 
 def write_title(figure: Figure, title: str, about: str) -> None:
-    """Write a title, and below it in small type what the plot is about."""
-    height = figure.get_size_inches()[1]
+    """Write a title, and below it in small type what the plot is about, in two lines where one is too short."""
+    width, height = figure.get_size_inches()
     figure.text(0.015, 1 - 0.09 / height, title, size=10, weight="bold", color=INK, va="top")
-    figure.text(0.015, 1 - 0.29 / height, about, size=SMALL, color=FAINT, va="top")
+    words = about.split(BETWEEN)
+    first = len(words)
+    while first > 1 and widest(figure, [BETWEEN.join(words[:first])]) > 0.97 * width:
+        first -= 1
+    lines = [BETWEEN.join(some) for some in (words[:first], words[first:]) if some]
+    for number, line in enumerate(lines):
+        figure.text(0.015, 1 - (0.29 + 0.12 * number) / height, line, size=SMALL, color=FAINT, va="top")
 
 
 def lowest_shown(means: pd.Series, logarithmic: bool) -> float:
@@ -85,7 +94,7 @@ def without_longest(points: pd.DataFrame, lowest: float) -> pd.DataFrame:
 
 def about_intervals(lows: pd.Series, lowest: float) -> str:
     """What the line below a title says of intervals that are left out; "" where none is."""
-    return "  ·  those that leave the axis not drawn" if (lows < lowest).any() else ""
+    return f"{BETWEEN}intervals that leave the axis are not drawn" if (lows < lowest).any() else ""
 
 
 def error_axis(

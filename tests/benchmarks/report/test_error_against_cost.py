@@ -75,7 +75,9 @@ def test_an_interval_that_leaves_a_logarithmic_axis_is_not_drawn(tmp_path):
     summary.scores.loc[summary.scores.index[::2], "low"] = -1.0
     for metric, told in (("rmse", True), ("psnr", False)):
         figure = error_against(summary, "walkthrough", "full", metric, TIME)
-        drawn = [text for text, _ in boxes(figure) if text.endswith("those that leave the axis not drawn")]
+        drawn = [
+            text for text, _ in boxes(figure) if text.endswith("intervals that leave the axis are not drawn")
+        ]
         assert bool(drawn) == told
         ends = [
             point[1]
