@@ -90,7 +90,7 @@ def run_track(
         ("--equal-time", equal_time),
         ("--training-seconds", training_seconds),
     ):
-        if value is not None and not 0 < value < math.inf:
+        if value is not None and (not value > 0 or (value == math.inf and option == "--equal-time")):
             raise TrackError(f"{option}: {value:g} is not allowed; allowed is a number above 0")
     if training_seconds is not None:
         chosen = chosen.with_training_seconds(preset, training_seconds)

@@ -180,10 +180,12 @@ def test_runs_are_paired_by_what_the_scenes_hold():
 
 def test_what_was_not_computed_or_is_not_there_is_named():
     results = fake({"path spp=1": 0.1, "path spp=2": 0.2})
-    with pytest.raises(
-        ResultsError, match="has no dssim of the full image: `gibench bench score R` computes it"
-    ):
-        leaderboard(results, "dssim")
+    results.run = {"metrics": ["rmse", "dssim"], "sequence_metrics": ["mabd"]}
+    for name, command in (("dssim", "score R"), ("flip", "score R --metrics flip")):
+        with pytest.raises(
+            ResultsError, match=f"has no {name} of the full image: `gibench bench {command}` computes it"
+        ):
+            leaderboard(results, name)
     results.skipped = {"dssim": "images are too small"}
     with pytest.raises(ResultsError, match="has no dssim of the full image: images are too small"):
         leaderboard(results, "dssim")
