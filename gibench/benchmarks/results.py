@@ -100,7 +100,6 @@ class Results:
                 raise ResultsError(f"{self.root} has no room '{room}'; {nearest(room, rooms)}")
             records = [record for record in records if record["config"]["scene"] == room]
         some = Results(self.folder, self.run, records)
-        some.superseded = self.superseded
         if group is None:
             return some
         tags = {str(record["config"]["scene"]): record.get("tags", []) for record in records}

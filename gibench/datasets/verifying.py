@@ -9,7 +9,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,9 @@ from gibench.datasets.recipes import Recipe
 from gibench.datasets.table import read_table
 from gibench.errors import GibenchError
 from gibench.rendering.channels import CHANNELS, PARTS
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 #: Types in which a kind of channel may be stored.
 STORED = {"half": (np.float16, np.float32), "float": (np.float32,), "uint": (np.uint32,)}
@@ -84,12 +87,13 @@ def verify(root: Path, on_room: Callable[[int, int], None] = lambda done, of: No
             problems.append(Problem(f"rooms/{room:06d}/frames.json", str(problem)))
     on_room(len(expected), len(expected))
     problems.extend(_panorama_problems(root, records))
-    problems.extend(_table_problems(root, records, recipe))
+    table = frame_table(records, recipe)
+    problems.extend(_table_problems(root, table, recipe))
     problems.extend(Problem(MANIFEST, what) for what in _contradictions(manifest, recipe))
     if len(records) == len(expected):
-        problems.extend(Problem(*fault) for fault in cache_faults(root, frame_table(records, recipe)))
+        problems.extend(Problem(*fault) for fault in cache_faults(root, table))
         if manifest["complete"]:
-            problems.extend(Problem(MANIFEST, what) for what in _wrong_sums(manifest, records, recipe))
+            problems.extend(Problem(MANIFEST, what) for what in _wrong_sums(manifest, records, table, recipe))
     problems.extend(_page_problems(root, manifest))
     return problems
 
@@ -104,14 +108,14 @@ def _contradictions(manifest: Mapping[str, Any], recipe: Recipe) -> Iterator[str
 
 
 def _wrong_sums(
-    manifest: Mapping[str, Any], records: Sequence[Mapping[str, Any]], recipe: Recipe
+    manifest: Mapping[str, Any], records: Sequence[Mapping[str, Any]], table: pd.DataFrame, recipe: Recipe
 ) -> Iterator[str]:
     """Say what a complete dataset sums up of its rooms, and they say otherwise. Older versions summed up less."""
     summed = manifest.get("totals")
     if summed is None:
         yield "it has no totals, though it is complete"
         return
-    totals = totals_of(records, frame_table(records, recipe), recipe)
+    totals = totals_of(records, table, recipe)
     del totals["denoise_changes"]  # those above a limit that versions may move
     for key, found in totals.items():
         if key in summed and not _same(summed[key], found):
@@ -240,7 +244,8 @@ def frame_faults(arrays: Mapping[str, NDArray[Any]], recipe: Recipe) -> Iterator
             yield f"color is not the sum of its five parts in {wrong} pixels"
 
 
-def _table_problems(root: Path, records: list[dict[str, Any]], recipe: Recipe) -> Iterator[Problem]:
+def _table_problems(root: Path, told: pd.DataFrame, recipe: Recipe) -> Iterator[Problem]:
+    """What is wrong with the table of frames. told: what the records of the rooms say."""
     try:
         table = read_table(root, recipe)
     except gate.GateError as problem:
@@ -250,5 +255,5 @@ def _table_problems(root: Path, records: list[dict[str, Any]], recipe: Recipe) -
     except DatasetError as problem:
         yield Problem(TABLE, str(problem))
         return
-    if not frame_table(records, recipe).equals(table):
+    if not told.equals(table):
         yield Problem(TABLE, "the table does not say what the records of the rooms say")

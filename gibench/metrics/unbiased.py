@@ -51,8 +51,8 @@ class Truth:
     """What is known of the true image, all (H, W, 3) linear radiance in Rec. 709 RGB.
 
     samples: two estimates without bias and with independent errors. halves: the same two denoised, each from its own
-    samples alone; of references that are not denoised the samples themselves, which leaves fewer metrics that are
-    `known`. exposure: for display values.
+    samples alone; of references that are not denoised the samples themselves, which leaves fewer metrics that it
+    `knows`. exposure: for display values.
 
     Raises DtypeError, ShapeError, NonFiniteError, RangeError for inputs that are not such images.
     """

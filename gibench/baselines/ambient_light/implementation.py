@@ -37,6 +37,11 @@ def fitted(frames: Iterable[tuple[NDArray[Any], NDArray[Any], float]]) -> NDArra
 class AmbientLight(DirectLight):
     """See `gibench.baselines.ambient_light.METHOD`."""
 
+    @staticmethod
+    def parts_of(site: Site) -> list[str]:
+        """Direct light as it is shown: indirect light is not traced."""
+        return ["full"]
+
     def train(self, training: Training) -> None:
         """Fit the constant."""
         if not len(training.views):

@@ -17,7 +17,7 @@ import zlib
 from pathlib import Path
 
 from gibench.benchmarks.report.source import ReportError
-from gibench.datasets.files import sync_file, sync_tree
+from gibench.datasets.files import sync_file, whole_folder
 
 SUMS = "SHA256SUMS"
 MOST_BYTES = 4 * 2**30
@@ -74,21 +74,19 @@ def unpack(file: Path, out: Path) -> Path:
     """
     if out.exists():
         raise ReportError(f"{out} exists: choose a new folder with --out")
-    partial = out.with_name(f".{out.name}.partial-{os.getpid()}")
-    shutil.rmtree(partial, ignore_errors=True)
     try:
         with zipfile.ZipFile(file) as archive:
-            for name, sha256 in _listed(archive, file).items():
-                path = partial / name
-                path.parent.mkdir(parents=True, exist_ok=True)
-                with archive.open(name) as source, open(path, "wb") as target:
-                    shutil.copyfileobj(source, target, _PIECE)
-                if _sha256(path) != sha256:
-                    raise ReportError(
-                        f"{file} is damaged: {name} is not as it was packed; get the file again"
-                    )
-        sync_tree(partial)
-        partial.rename(out)
+            listed = _listed(archive, file)
+            with whole_folder(out) as partial:
+                for name, sha256 in listed.items():
+                    path = partial / name
+                    path.parent.mkdir(parents=True, exist_ok=True)
+                    with archive.open(name) as source, open(path, "wb") as target:
+                        shutil.copyfileobj(source, target, _PIECE)
+                    if _sha256(path) != sha256:
+                        raise ReportError(
+                            f"{file} is damaged: {name} is not as it was packed; get the file again"
+                        )
     except FileNotFoundError:
         raise ReportError(f"there is no archive {file}") from None
     except OSError as problem:
@@ -100,8 +98,6 @@ def unpack(file: Path, out: Path) -> Path:
         raise ReportError(f"{file} is no archive of a report, or a damaged one") from None
     except DAMAGED as problem:
         raise ReportError(f"{file} is no archive of a report, or a damaged one ({problem})") from None
-    finally:
-        shutil.rmtree(partial, ignore_errors=True)
     return out / "index.html"
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gibench.benchmarks.report.figures import (
+    BETWEEN,
     SMALL,
     WIDTH,
     about_intervals,
@@ -129,7 +130,7 @@ def _about(summary: Summary, track: str, part: str, machine: str | None) -> str:
     words = [part_title(part), f"track {short(track)}", over]
     if machine:
         words.append(machine if len(machine) < 40 else machine[:38] + "…")
-    return "  ·  ".join(words)
+    return BETWEEN.join(words)
 
 
 def _front(axes: Axes, x: pd.Series, points: pd.DataFrame, higher: bool) -> tuple[Any, Any]:

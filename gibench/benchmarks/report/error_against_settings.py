@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gibench.benchmarks.report.figures import (
+    BETWEEN,
     WIDTH,
     about_intervals,
     end_labels,
@@ -25,7 +26,7 @@ from gibench.benchmarks.report.figures import (
 )
 from gibench.benchmarks.report.plot_style import LINES, look, tick_text
 from gibench.benchmarks.report.runs import part_title
-from gibench.benchmarks.report.summary import Summary, is_number, knobs_of, label_without
+from gibench.benchmarks.report.summary import Summary, is_number, knobs_of, label_without, noise_level
 from gibench.benchmarks.report.wording import metric_title, printable
 from gibench.metrics import METRICS, mean_interval
 
@@ -113,8 +114,7 @@ def _in_shared_rooms(
         found = mean_interval(frames["value"].to_numpy(), frames["scene"].to_numpy())
         ends = np.array([found.low, found.high])
         line.loc[entry, ["mean", "low", "high"]] = [found.mean, *np.where(np.isfinite(ends), ends, np.nan)]
-    noise = floor[floor["scene"].isin(shared) & np.isfinite(floor["value"])]
-    line["floor"] = noise.groupby("scene")["value"].mean().mean()
+    line["floor"] = noise_level(floor, shared)
     return line, len(shared)
 
 
@@ -136,7 +136,7 @@ def error_against_settings(
     figure, first = new_figure(WIDTH, height)
     first.remove()
     lowest = lowest_shown(everything["mean"], logarithmic)
-    about = f"{part_title(part)}  ·  track {short(track)}  ·  95 % intervals  ·  {short(machine)}"
+    about = BETWEEN.join([part_title(part), f"track {short(track)}", "95 % intervals", short(machine)])
     about += about_intervals(everything["low"], lowest)
     everything = without_longest(everything, lowest)
     write_title(figure, f"{metric_title(metric)} against settings", about)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gibench.benchmarks.report.figures import (
+    BETWEEN,
     SMALL,
     WIDTH,
     cost_axis,
@@ -64,7 +65,7 @@ def error_against_training(
     write_title(
         figure,
         "Held-out error against training time and steps",
-        f"track {short(track)}  ·  a line a training  ·  {short(machine)}",
+        BETWEEN.join([f"track {short(track)}", "a line a training", short(machine)]),
     )
     width = (WIDTH - left - between - right) / len(AXES)
     methods = list(summary.entries["method"].unique())

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gibench.benchmarks.report.figures import (
+    BETWEEN,
     WIDTH,
     end_labels,
     entry_name,
@@ -61,7 +62,7 @@ def error_along_path(summary: Summary, track: str, part: str, metric: str) -> Fi
     )
     where = "along the path" if any(sequences.values()) else "of each still"
     title = f"{metric_title(metric)} {where}, the best setting of each method"
-    write_title(figure, title, f"{part_title(part)}  ·  track {track}")
+    write_title(figure, title, f"{part_title(part)}{BETWEEN}track {track}")
     for order, scene in enumerate(scenes):
         bottom = height - 0.62 - (order + 1) * (panel + gap) + gap - 0.1
         axes = new_panel(figure, (0.68, bottom, WIDTH - 0.68 - right, panel))

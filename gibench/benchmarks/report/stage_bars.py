@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gibench.benchmarks.report.figures import (
+    BETWEEN,
     SMALL,
     WIDTH,
     entry_name,
@@ -43,9 +44,9 @@ def stage_bars(source: ReportSource, summary: Summary, track: str, machine: str)
     figure, first = new_figure(WIDTH, height)
     first.remove()
     left = widest(figure, names) + 0.2
-    about = f"track {track}  ·  medians over the path, means over rooms; numbers are milliseconds"
+    about = f"track {track}{BETWEEN}medians over the path, means over rooms; numbers are milliseconds"
     write_title(
-        figure, "Where the time of a frame goes", about if len(machine) > 40 else f"{about}  ·  {machine}"
+        figure, "Where the time of a frame goes", about if len(machine) > 40 else f"{about}{BETWEEN}{machine}"
     )
     columns = [*times.columns, "frame"]
     width = (WIDTH - left - 0.1) / len(columns)

@@ -265,19 +265,24 @@ def _scores(
             seeds = grid[entry].to_numpy()  # a row a frame, a column a seed
             finite = np.isfinite(seeds).all(axis=1)
             scenes = set(rooms[measured])
-            own_noise = noise[noise["scene"].isin(scenes) & np.isfinite(noise["value"])]
-            level = own_noise.groupby("scene")["value"].mean().mean() if len(own_noise) else math.nan
-            row: dict[str, Any] = {"entry": entry, "part": part, "metric": metric, "floor": float(level)}
+            level = noise_level(noise, scenes)
+            row: dict[str, Any] = {"entry": entry, "part": part, "metric": metric, "floor": level}
             row["left_out"] = int((measured & ~finite).sum())
             row |= _mean(seeds[finite].T, rooms[finite])
             other = _opponent(entries, entry, against)
             if other in grid.columns.unique("entry"):
                 opponent = grid[other].to_numpy()
                 # What is against the truth does not depend on what the reference has wrong.
-                doubt = math.nan if metric in unbiased else float(level)
+                doubt = math.nan if metric in unbiased else level
                 row |= _difference(seeds, opponent, rooms, METRICS[str(metric)], doubt)
             rows.append(row)
     return rows
+
+
+def noise_level(noise: pd.DataFrame, scenes: set[Any]) -> float:
+    """Mean over some scenes of the floor of a part and metric, each the mean of its frames; NaN where none is known."""
+    own = noise[noise["scene"].isin(scenes) & np.isfinite(noise["value"])]
+    return float(own.groupby("scene")["value"].mean().mean())
 
 
 def _frames_of(table: pd.DataFrame, entry: Any) -> pd.MultiIndex:

@@ -58,8 +58,20 @@ def write_report(
     return page
 
 
-OWN = ("tables/*.md", "tables/*.tex", "plots/*.svg", "plots/*.png", "images/*/*.js", "errors/*/*.js")
-"""Files of a report beside its page, by which those of an older one in the same folder are known."""
+OWN = (
+    *(
+        f"tables/*{name}*.{kind}"
+        for name in ("errors", "preparation", "frame-time", "failed")
+        for kind in ("md", "tex")
+    ),
+    *(
+        f"plots/*{name}*.{kind}"
+        for name in ("error-a", "stages", "training-curves")
+        for kind in ("svg", "png")
+    ),
+    *(f"{kind}/*/[0-9][0-9][0-9][0-9]-*.js" for kind in ("images", "errors")),
+)
+"""Names of what a report writes beside its page and CSV files, by which an older one's in the same folder are known."""
 
 
 def _remove_older(out: Path, written: set[Path]) -> None:
