@@ -183,14 +183,16 @@ class Result(Checked):
 class Scores(Checked):
     """The scores of a result, or of the references themselves. None stands for what has no value.
 
-    codes: digest of the sources by which a metric was computed. unbiased: metrics that are against the truth, by
-    samples that were not denoised. clipped: of these, how many values stand as 0 for an estimate below it.
+    references: hash of what they are against, None in files of before. codes: digest of the sources by which a metric
+    was computed. unbiased: metrics that are against the truth, by samples that were not denoised. clipped: of these,
+    how many values stand as 0 for an estimate below it.
     """
 
     format: int
     frames: dict[Part, dict[Metric, list[float | None]]]
     sequences: dict[Part, dict[str, dict[MetricOrSide, float | None]]]
     skipped: dict[str, str]
+    references: Sha256 | None = None
     exposures: list[Annotated[float, Field(gt=0)]] = Field(default_factory=list)
     codes: dict[str, str] = Field(default_factory=dict)
     unbiased: list[Metric] = Field(default_factory=list)

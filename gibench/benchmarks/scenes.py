@@ -62,6 +62,7 @@ class SceneFiles:
     frames: tuple[Frame, ...]
     sequences: tuple[Stretch, ...]
     halves: tuple[tuple[Path, ...], tuple[Path, ...]]
+    references_sha256: str
     max_depth: int
     nearness: tuple[str, ...] = ()
 
@@ -138,17 +139,19 @@ def scenes_in(root: Path, again: Path) -> list[SceneFiles]:
             f"{root} has no frame: every room was rejected; choose another seed or other kinds"
         )
     recipe = recipe_of(dataset.manifest)
+    of_the_other = dict(zip(other.frames["file"], other.frames["sha256"], strict=True))
     scenes = []
     for number, found in groupby(sorted(dataset, key=lambda f: (f.room, f.view)), key=lambda f: f.room):
         frames = tuple(found)
-        row = frames[0].row
+        row, content = frames[0].row, _content(root, number)
+        hashes = [(frame.row["sha256"], of_the_other[frame.row["file"]]) for frame in frames]
         scenes.append(
             SceneFiles(
                 name=scene_name(number),
                 room=number,
                 kind=str(row["kind"]),
                 folder=dataset.room_folder(number),
-                sha256=_content(root, number),
+                sha256=content,
                 resolution=(int(row["width"]), int(row["height"])),
                 frames=frames,
                 sequences=_sequences(frames),
@@ -156,6 +159,7 @@ def scenes_in(root: Path, again: Path) -> list[SceneFiles]:
                     tuple(_inside(root, str(frame.row["file"])) for frame in frames),
                     tuple(_inside(again, str(frame.row["file"])) for frame in frames),
                 ),
+                references_sha256=_digest([content, hashes]),
                 max_depth=recipe.max_depth,
                 nearness=_nearness(recipe, frames, room_record(root, number).get("given_cameras", 0)),
             )
@@ -199,7 +203,11 @@ def _content(root: Path, room: int) -> str:
     files = room_record(root, room)["files"]
     # The same geometry once more, for viewers.
     known = {name: file["sha256"] for name, file in files.items() if not name.endswith(".glb")}
-    return hashlib.sha256(json.dumps(known, sort_keys=True).encode()).hexdigest()
+    return _digest(known)
+
+
+def _digest(value: Any) -> str:
+    return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()
 
 
 def lay_out(scene: SceneFiles, folder: Path) -> Path:

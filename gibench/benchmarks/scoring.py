@@ -221,10 +221,11 @@ class _Unit:
         return f"{self.scene.name}: reference" if self.id is None else f"result {self.id}"
 
     def read(self) -> dict[str, Any]:
-        """The file so far."""
-        name = self.id or self.scene.name
-        empty = {"format": FORMAT, "frames": {}, "sequences": {}, "skipped": {}}
-        return read_scores(self.folder, name) or empty
+        """The file so far; an empty one where it is against other references."""
+        scores = read_scores(self.folder, self.id or self.scene.name)
+        if scores is None or scores.get("references") != self.scene.references_sha256:
+            return {"format": FORMAT, "frames": {}, "sequences": {}, "skipped": {}}
+        return scores
 
     def missing(self) -> list[str]:
         """Metrics that the file lacks, or has from other code: neither values nor why there are none."""
@@ -302,6 +303,7 @@ def _scored(unit: _Unit) -> _Outcome:
     of_before = {name: count for name, count in scores.get("clipped", {}).items() if name not in done}
     scores |= {
         "gibench": gibench.__version__,
+        "references": unit.scene.references_sha256,
         "exposures": list(unit.exposures),
         "codes": {
             **scores.get("codes", {}),
@@ -336,10 +338,12 @@ def _exposure_code() -> str:
 def exposures_of(folder: RunFolder, scene: SceneFiles, *, anew: bool = False) -> tuple[float, ...]:
     """The exposure that each frame is seen under: `reference_exposure`, shared by the frames of a sequence.
 
-    That of the scores where there are some. anew: only if the same code found them.
+    That of the scores of these references where there are some. anew: only if the same code found them.
     """
     known = read_scores(folder, scene.name) or {}
-    current = not anew or known.get("codes", {}).get(EXPOSURES) == _exposure_code()
+    current = known.get("references") == scene.references_sha256 or (not anew and "references" not in known)
+    if anew:
+        current = current and known.get("codes", {}).get(EXPOSURES) == _exposure_code()
     if current and len(known.get("exposures", ())) == len(scene):  # older scores have one, or none
         return tuple(float(exposure) for exposure in known["exposures"])
     exposures = [0.0] * len(scene)

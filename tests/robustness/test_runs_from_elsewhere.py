@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from gibench.benchmarks.scoring import score
 from gibench.cli import run as command
 from gibench.cli.app import app
 from gibench.datasets.files import as_json
+from tests.robustness import samples
 
 
 def rewritten(run: RunFolder, number: int = 0, **changes) -> str:
@@ -228,3 +230,45 @@ def test_exposures_of_other_frames_are_computed_anew(run, exposures):
     path = run.score_file("room-000000")
     path.write_bytes(as_json({**json.loads(path.read_text()), "exposures": exposures}))
     assert [load(run.root).exposure("room-000000", frame) for frame in range(3)] == right
+
+
+def rmse_and_floor(run):
+    """Means over all frames."""
+    found = load(run.root)
+    return [float(table[table["metric"] == "rmse"]["value"].mean()) for table in (found.frames, found.floor)]
+
+
+@pytest.mark.parametrize("of_before", [False, True])
+def test_references_that_were_made_anew_are_scored_against_anew(run, monkeypatch, of_before):
+    """Of the same scene and under the same name: neither the old errors stand, nor the old floor or exposure.
+
+    of_before: scores that do not say what they are against.
+    """
+    score(run)
+    assert score(run).done == 0
+    exposure, before = load(run.root).exposure("room-000000", 0), rmse_and_floor(run)
+    if of_before:
+        for name in (good(run), "room-000000"):
+            scores = json.loads(run.score_file(name).read_text())
+            del scores["references"]
+            run.score_file(name).write_bytes(as_json(scores))
+        assert load(run.root).exposure("room-000000", 0) == exposure
+    shades = samples.pixels
+
+    path = {"path": "walk", "path_views": samples.FRAMES, "rendered": "path"}
+    for seed, folder in enumerate(run.references):
+
+        def brighter(channels, resolution, view, offset=50 * (seed + 1)):
+            return {name: 2 * value for name, value in shades(channels, resolution, view + offset).items()}
+
+        monkeypatch.setattr(samples, "pixels", brighter)
+        shutil.rmtree(folder)
+        samples.dataset(folder, 1, 1, **path, sample_seed=seed)
+    if not of_before:
+        assert load(run.root).exposure("room-000000", 0) == pytest.approx(exposure / 2, rel=0.2)
+    assert score(run).done == 3
+    assert load(run.root).exposure("room-000000", 0) == pytest.approx(exposure / 2, rel=0.2)
+    after = rmse_and_floor(run)
+    assert after[0] > 1.5 * before[0]
+    assert after[1] > before[1] == 0
+    assert score(run).done == 0
