@@ -207,13 +207,8 @@ class Run:
 
     def _make(self, which: Any) -> None:
         order = self.order
-        rooms = order.room_count
-        if which == "training" and order.size.training_rooms is not None:
-            rooms = order.size.training_rooms
-        elif (manifest := self.folder.dataset(which) / "dataset.json").exists():
-            from gibench.datasets.manifest import read_manifest
-
-            rooms = max(rooms, int(read_manifest(manifest.parent)["recipe"]["rooms"]))
+        own = order.size.training_rooms if which == "training" else None
+        rooms = self._rooms_of_scenes() if own is None else own
         panoramas = None if order.size.panoramas is None else self.folder.panoramas
         recipe = order.size.recipe(which, rooms, order.scenes, panoramas)
 
@@ -231,6 +226,18 @@ class Run:
             on_progress=tell,
         )
         self.state.scenes = None
+
+    def _rooms_of_scenes(self) -> int:
+        """Number of rooms or scenes: as many as asked for, or as any dataset of them was begun with, since both
+        references have to be of the same."""
+        from gibench.datasets.manifest import read_manifest
+
+        of_scenes = ["reference", "reference-again"]
+        if self.order.size.training_rooms is None:
+            of_scenes.append("training")
+        begun = [self.folder.dataset(which) for which in of_scenes]
+        there = [root for root in begun if (root / "dataset.json").exists()]
+        return max([self.order.room_count, *(int(read_manifest(root)["recipe"]["rooms"]) for root in there)])
 
     def _cache_training(self) -> None:
         """Decode once what trainings read over and over, unless that takes more than half of the disk's room."""

@@ -215,6 +215,24 @@ def test_a_full_disk_stops_the_run_and_leaves_no_half_files(scenes_only):
 
 
 @pytest.mark.skipif(not hasattr(os, "killpg"), reason="needs process groups")
+def test_fewer_rooms_than_a_run_began_with(tmp_path, monkeypatch):
+    """Stopped after the first reference of two rooms: the second has to be of both, though one is asked for now."""
+    make, calls = running.make, []
+
+    def stopped(*arguments, **options):
+        calls.append(arguments)
+        if len(calls) == 2:
+            raise KeyboardInterrupt
+        return make(*arguments, **options)
+
+    monkeypatch.setattr(running, "make", stopped)
+    with pytest.raises(Interrupted):
+        run(tmp_path / "run", order(toys.PLAIN, rooms=2))
+    monkeypatch.setattr(running, "make", make)
+    run(tmp_path / "run", order(toys.PLAIN, rooms=1))
+    assert {record["room"] for record in load(tmp_path / "run").records()} == {0}
+
+
 def test_ctrl_c_is_tidy_and_says_how_to_continue(scenes_only):
     code = (
         "from tests.benchmarks import toys; from tests.benchmarks.conftest import order\n"
