@@ -181,6 +181,7 @@ class _Seen:
 
     def __init__(self) -> None:
         self.indirect: list[float] = []
+        self.specular: list[float] = []
         self.depths: list[NDArray[Any]] = []
         self.alphas: list[NDArray[Any]] = []
         self.pixels = self.hits = 0
@@ -194,6 +195,7 @@ class _Seen:
             sums = {name: float(channels[name].sum(dtype=np.float64)) for name in PARTS[1:]}
             if (total := sum(sums.values())) > 0:
                 self.indirect.append((sums["indirect_diffuse"] + sums["indirect_specular"]) / total)
+                self.specular.append((sums["direct_specular"] + sums["indirect_specular"]) / total)
         if "depth" in channels:
             depth = channels["depth"].ravel()
             self.depths.append(depth[depth > 0][::7])
@@ -211,9 +213,12 @@ class _Seen:
 
     def light(self) -> list[tuple[str, str]]:
         """Lines about light."""
-        return (
-            [("indirect of all reflected light", f"{_range(self.indirect, 100)} %")] if self.indirect else []
-        )
+        shares = {"indirect": self.indirect, "specular": self.specular}
+        return [
+            (f"{name} of all reflected light", f"{_range(share, 100)} %")
+            for name, share in shares.items()
+            if share
+        ]
 
     def lines(self) -> list[tuple[str, str]]:
         """Lines about things."""

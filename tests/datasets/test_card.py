@@ -33,7 +33,10 @@ def test_light_materials_depth_and_gloss_are_counted():
     frame["specular_albedo"] = ones * (frame["material_id"] == 1)
     frame["roughness"] = np.where(frame["material_id"] == 1, 0.05, 1.0).astype(np.float32)
     seen.add(frame, ["oak", "felt"], {"oak": {"family": "wood"}})
-    assert seen.light() == [("indirect of all reflected light", "75 (75 to 75) %")]
+    assert seen.light() == [
+        ("indirect of all reflected light", "75 (75 to 75) %"),
+        ("specular of all reflected light", "25 (25 to 25) %"),
+    ]
     assert dict(seen.lines()) == {
         "materials": "wood 57 %, of the scene 43 %",
         "depth": "3 (3 to 3) m",

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import os
 
+import mitsuba as mi
 import numpy as np
 import pytest
+from scipy.ndimage import uniform_filter
 
 from gibench.rendering import denoise
 from gibench.rendering.backend import is_scalar, limit_threads
+from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.channels import PARTS, SAMPLED
 from gibench.rendering.render import render_frame
 from gibench.rendering.scene import load_dict
+from gibench.stress.scenes import area, diffuse, rectangle, small_room
 
 from . import scenes
 
@@ -31,6 +35,32 @@ def test_denoising_reduces_the_error_and_keeps_the_sum():
     np.testing.assert_array_equal(clean["color_se"], noisy["color_se"])
     np.testing.assert_array_equal(clean["emission"], noisy["emission"])
     assert min(clean[name].min() for name in PARTS) >= 0
+
+
+def _detail(image):
+    """What differs from the mean of the 7 × 7 pixels around, in units of the image's mean."""
+    image = image / image.mean()
+    return (image - uniform_filter(image, (7, 7, 0))).ravel()
+
+
+@pytest.mark.parametrize("spp", [4, 16])
+def test_textures_are_not_blurred(spp):
+    """Tiles of some two pixels under a lamp that shines at the ceiling.
+
+    Without albedo to guide it the denoiser keeps .2 of their contrast at 4 samples and .5 at 16.
+    """
+    tiles = np.random.default_rng(0).uniform(0.2, 0.8, (24, 24, 1)) * [1.0, 0.8, 0.6]
+    texture = {"type": "bitmap", "bitmap": mi.Bitmap(tiles.astype(np.float32)), "raw": True}
+    floor = {"type": "diffuse", "reflectance": {**texture, "filter_type": "nearest"}}
+    room = small_room(glossy=False)
+    room["floor"]["bsdf"] = floor
+    room["lamp"] = rectangle([0, 0, 1.4], [0, 0, 1], (0.25, 0.25), bsdf=diffuse(0.5), emitter=area(8))
+    scene, camera = load_dict(room), PinholeCamera((0.0, 0.0, 1.3), (0.01, 0.0, 0.0), 1.0)
+    options = {"resolution": (64, 64), "channels": ["color"], "max_depth": 8}
+    truth = _detail(render_frame(scene, camera, spp=4096, seed=1, **options).arrays["color"])
+    clean = _detail(render_frame(scene, camera, spp=spp, seed=2, denoise=True, **options).arrays["color"])
+    assert clean @ truth > 0.9 * (truth @ truth)
+    assert np.corrcoef(clean, truth)[0, 1] > 0.85
 
 
 def test_a_black_part_stays_exactly_black():
