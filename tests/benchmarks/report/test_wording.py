@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from gibench.benchmarks.report.wording import metric_title, number, seconds, size
+from gibench.benchmarks.report.wording import against, metric_title, number, seconds, size
 from gibench.metrics import METRICS
 
 
@@ -33,3 +33,14 @@ def test_durations_and_sizes_take_the_unit_that_suits_them():
 
 def test_every_metric_has_a_title():
     assert all(metric_title(name) != name for name in METRICS)
+
+
+def test_what_metrics_are_against():
+    names = ["rmse", "dssim", "relmse"]
+    assert against(names, ()) == "All metrics are against the reference."
+    some = against(names, {"rmse", "relmse"})
+    assert some == (
+        "Without bias against the truth, by samples that are not denoised: RMSE, relMSE. "
+        "Against the reference: DSSIM."
+    )
+    assert against(["rmse"], {"rmse", "mse"}).endswith("not denoised: RMSE.")
