@@ -10,6 +10,7 @@ from gibench.baselines.image_space_gathering.gathering import WIDEST, gather, lo
 from gibench.baselines.image_space_gathering.pyramid import LEVELS, Layout, MirrorImage, Pyramid
 from gibench.baselines.image_space_gathering.reflectance import directional_albedo
 from gibench.baselines.stages import Stages
+from gibench.rendering.layers import Layers
 from gibench.rendering.render import render_frame
 from gibench.rendering.scene import load_dict
 from tests.baselines.glossy_rooms import CAMERA, LIGHTMAP, glossy_room, mirror_image, rendered
@@ -193,7 +194,6 @@ def test_directional_albedo_against_many_samples(material, cosine):
     si = dr.zeros(mi.SurfaceInteraction3f, count)
     si.wi = mi.Vector3f(float(np.sqrt(1 - cosine**2)), 0.0, cosine)
     from gibench.rendering import flags
-    from gibench.rendering.layers import Layers
     from gibench.rendering.lobes import lobes_of
 
     found = np.array(directional_albedo(Layers([bsdf]), si, bsdf, dr.full(mi.Bool, True, count)))[:, 0]
@@ -201,3 +201,23 @@ def test_directional_albedo_against_many_samples(material, cosine):
     u = mi.Point2f(rng.random((2, count), dtype=np.float32))
     _, weight = bsdf.sample(lobes_of(flags.NOT_DIFFUSE), si, mi.Float(rng.random(count, dtype=np.float32)), u)
     np.testing.assert_allclose(found, np.array(weight).mean(axis=1), rtol=0.025)
+
+
+@pytest.mark.parametrize("cosine", [1.0, 0.5])
+@pytest.mark.parametrize(
+    ("material", "tolerance"), [("dielectric", 1e-5), ("thindielectric", 1e-5), ("roughdielectric", 0.01)]
+)
+def test_directional_albedo_of_glass(material, tolerance, cosine):
+    """What it reflects alone, by Fresnel's equations: .04 of the light; 64 samples of all lobes are a fifth off."""
+    rough = {"alpha": 0.05, "distribution": "ggx"} if material == "roughdielectric" else {}
+    bsdf = mi.load_dict({"type": material, "int_ior": 1.5, "ext_ior": 1.0, **rough})
+    si = dr.zeros(mi.SurfaceInteraction3f, 1)
+    si.wi = mi.Vector3f(float(np.sqrt(1 - cosine**2)), 0.0, cosine)
+    found = np.array(directional_albedo(Layers([bsdf]), si, bsdf, dr.full(mi.Bool, True, 1)))[0, 0]
+    inside = np.sqrt(1 - (1 - cosine**2) / 1.5**2)
+    across = (cosine - 1.5 * inside) / (cosine + 1.5 * inside)
+    along = (1.5 * cosine - inside) / (1.5 * cosine + inside)
+    face = (across**2 + along**2) / 2
+    # A pane has two faces, between which light goes to and fro.
+    wanted = 2 * face / (1 + face) if material == "thindielectric" else face
+    assert found == pytest.approx(wanted, rel=tolerance)
