@@ -70,12 +70,11 @@ def cube(emitted: float, floor: dict[str, Any] | None = None) -> Scene:
 
 
 @contextmanager
-def prepared(scene: Scene) -> Iterator[Site]:
-    """A place to bake in, which is gone afterwards."""
+def prepared(scene: Scene, files: Path | None = None) -> Iterator[Site]:
+    """A place to bake in, which is gone afterwards. files: the folder of its scene.xml, where it has one."""
     with TemporaryDirectory() as folder:
-        yield Site(
-            scene, Path(folder), RESOLUTION, (), 0, BakeCache(Path(folder) / "bakes", "scene", {}), Stages()
-        )
+        cache = BakeCache(Path(folder) / "bakes", "scene", {})
+        yield Site(scene, files or Path(folder), RESOLUTION, (), 0, cache, Stages())
 
 
 def frames(site: Site, camera: PinholeCamera, methods: tuple[Method, ...] = METHODS) -> dict[str, Prediction]:
