@@ -207,6 +207,8 @@ def test_lights_survive_the_table(tmp_path):
         ({"lighting": "moon"}, "'moon' is not allowed"),
         ({"environments": ["indoor"]}, "set lighting"),
         ({"lighting": "environments", "environments": ["indor"]}, "did you mean indoor"),
+        ({"lighting": "area-light", "kinds": ["still-life"]}, "kinds has still-life, which an environment"),
+        ({"lighting": "area-light", "kinds": ["office", "still-life"]}, "set lighting to .environments"),
         ({"path": "walk", "path_moves": "light"}, "keeps its own"),
         ({"lighting": "area-light", "path_moves": "light"}, "needs a path"),
         ({"lighting": "area-light", "path": "walk", "sequences": {"a": {"views": 2}}}, "both set"),
