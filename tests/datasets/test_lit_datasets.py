@@ -209,6 +209,11 @@ def test_lights_survive_the_table(tmp_path):
         ({"lighting": "environments", "environments": ["indor"]}, "did you mean indoor"),
         ({"lighting": "area-light", "kinds": ["still-life"]}, "kinds has still-life, which an environment"),
         ({"lighting": "area-light", "kinds": ["office", "still-life"]}, "set lighting to .environments"),
+        (
+            {"lighting": "area-light", "sampling": "guided"},
+            "sampling is .guided., but .* holds for one light",
+        ),
+        ({"lighting": "environments", "sampling": "guided"}, "set lighting to .own."),
         ({"path": "walk", "path_moves": "light"}, "keeps its own"),
         ({"lighting": "area-light", "path_moves": "light"}, "needs a path"),
         ({"lighting": "area-light", "path": "walk", "sequences": {"a": {"views": 2}}}, "both set"),
