@@ -39,7 +39,6 @@ def test_the_presets_of_the_walkthrough_are_what_the_issue_asks_for():
         assert again.sample_seed != reference.sample_seed
         assert again.model_copy(update={"sample_seed": reference.sample_seed}) == reference
         assert {*MOVING, *(c for part in track.parts for c in CHANNELS_OF[part])} <= set(reference.channels)
-        # Methods trace as far as gibench does where it is not told; nothing may ask for more.
         assert reference.max_depth == training.max_depth == MAX_DEPTH
 
 
