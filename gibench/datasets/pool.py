@@ -258,9 +258,11 @@ def _serve(connection: Connection, work: Work) -> None:
         if os.environ.get("GIBENCH_DEBUG"):
             traceback.print_exc()
         from gibench.generators.imported.errors import SceneFileError
+        from gibench.generators.layouts.placement import RejectedRoom
 
         with contextlib.suppress(OSError):
-            if isinstance(problem, SceneFileError):
+            # Rooms that are rejected are left out, but for a scene that is the only one.
+            if isinstance(problem, SceneFileError | RejectedRoom):
                 connection.send(("bad scene", str(problem)))
             else:
                 connection.send(("failed", explained(problem, room, work.place)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+from collections.abc import Hashable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -40,10 +41,19 @@ def contact_sheet(root: Path, table: pd.DataFrame) -> Image.Image:
     tiles = []
     for row in chosen.to_dict("records"):
         picture = thumbnail(root / str(row["file"]))
-        tiles.append((picture, f"room {row['room']}  view {row['view']}", str(row["kind"])))
+        tiles.append((picture, f"room {row['room']}  view {row['view']}", remark_of(row)))
     width, height = tiles[0][0].size
     # As near to a 3:2 sheet as whole columns allow.
     return grid(tiles, columns=max(1, round(math.sqrt(len(tiles) * 1.5 * height / width))))
+
+
+def remark_of(row: Mapping[Hashable, Any]) -> str:
+    """What a sheet says of a frame: its sequence, its environment map, as far as it has them, and its kind.
+
+    All frames of a room have one kind, so that comes last, where a long remark is cut.
+    """
+    names = (" ".join(str(row.get(column, "")).split()) for column in ("path", "environment", "kind"))
+    return ", ".join(name for name in names if name)
 
 
 def frame_panel(frame: Frame) -> Image.Image:
@@ -91,18 +101,38 @@ def _enlarged(picture: Picture) -> Image.Image:
 
 
 def grid(tiles: list[tuple[Image.Image, str, str]], columns: int) -> Image.Image:
-    """Tiles in reading order, each under its title (left) and a remark (right); all tiles have one size."""
+    """Tiles in reading order, each under its title (left) and a remark; all tiles have one size.
+
+    Remarks stand at the right of the titles, or all of them below, where one is too long for that.
+    """
     width, height = tiles[0][0].size
     gap, size = 6, 13
+    font = ImageFont.load_default(size)
+    below = any(font.getlength(title) + font.getlength(remark) + 12 > width for _, title, remark in tiles)
     line = size + 7
+    above = line + size + 4 if below and any(remark for _, _, remark in tiles) else line
     rows = math.ceil(len(tiles) / columns)
-    sheet = Image.new("RGB", (gap + columns * (width + gap), gap + rows * (height + line + gap)), _BACKGROUND)
-    draw, font = ImageDraw.Draw(sheet), ImageFont.load_default(size)
+    sheet = Image.new(
+        "RGB", (gap + columns * (width + gap), gap + rows * (height + above + gap)), _BACKGROUND
+    )
+    draw = ImageDraw.Draw(sheet)
     for i, (image, title, remark) in enumerate(tiles):
-        x, y = gap + i % columns * (width + gap), gap + i // columns * (height + line + gap)
+        x, y = gap + i % columns * (width + gap), gap + i // columns * (height + above + gap)
         draw.text((x + 2, y + line / 2), title, _INK, font, anchor="lm")
-        left = width - draw.textlength(title, font) - 12
-        if draw.textlength(remark, font) <= left:
+        if below:
+            draw.text(
+                (x + 2, y + line / 2 + size + 4), _cut(remark, font, width - 4), _FAINT, font, anchor="lm"
+            )
+        else:
             draw.text((x + width - 2, y + line / 2), remark, _FAINT, font, anchor="rm")
-        sheet.paste(image, (x, y + line))
+        sheet.paste(image, (x, y + above))
     return sheet
+
+
+def _cut(text: str, font: Any, width: float) -> str:
+    """As much of a text as has room, with a sign that there is more."""
+    if font.getlength(text) <= width:
+        return text
+    while text and font.getlength(f"{text}…") > width:
+        text = text[:-1]
+    return f"{text}…"

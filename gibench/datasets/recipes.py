@@ -247,6 +247,16 @@ class Recipe(BaseModel):
             raise PydanticCustomError(
                 "lighting", 'rotations is set, but not the lighting: set lighting to "environments"'
             )
+        if self.lighting == "area-light" and "still-life" in self.kinds and not self.scenes:
+            raise PydanticCustomError(
+                "lighting",
+                'kinds has still-life, which an environment lights: set lighting to "environments", or leave it out',
+            )
+        if self.sampling == "guided" and self.lighting != "own":
+            raise PydanticCustomError(
+                "sampling",
+                'sampling is "guided", but what is learned of a room holds for one light: set lighting to "own"',
+            )
         moving = self.path_moves != "camera" or any(s.moves != "camera" for s in self.sequences.values())
         if moving and self.lighting == "own":
             raise PydanticCustomError(

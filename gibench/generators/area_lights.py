@@ -116,8 +116,6 @@ def sample_area_light_path(
     """
     if frames < 2:
         return (sample_area_light(rng, space, cameras=cameras, aspect=aspect, **fixed),) * frames
-    if frames < 2:
-        return (sample_area_light(rng, space, cameras=cameras, aspect=aspect, **fixed),) * frames
     for _ in range(PATH_TRIES):
         motion = _sample_motion(rng, space, fixed)
         if motion is None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Protocol, TypeVar
 
 import numpy as np
 
+from gibench.generators.layouts.placement import RejectedRoom
 from gibench.generators.parts import Camera, Room
 from gibench.rendering.lighting import EnvironmentMap, Lighting, Shot
 from gibench.rendering.panoramas import Panorama
@@ -88,13 +89,19 @@ class AreaLights:
 
 
 def light_space(room: Room | ImportedRoom) -> LightSpace:
-    """Space for the area lights of a room. Raises NoFreeSpace, BackendError."""
+    """Space for the area lights of a room. Raises NoPlaceForLight, BackendError."""
     from gibench.rendering.backend import select_variant
 
     select_variant()  # before anything loads Mitsuba, so that it finds the right LLVM
+    from gibench.generators.area_lights import NoPlaceForLight
     from gibench.generators.light_space import LightSpace, room_light_space
+    from gibench.rendering.free_space import NoFreeSpace
 
-    return room_light_space(room) if isinstance(room, Room) else LightSpace(room.scene.loaded, room.free)
+    try:
+        return room_light_space(room) if isinstance(room, Room) else LightSpace(room.scene.loaded, room.free)
+    except NoFreeSpace:
+        advice = "nothing is enclosed by a floor, a ceiling and walls; leave this room out"
+        raise _named(room, NoPlaceForLight("no place for an area light", advice)) from None
 
 
 def lit(room: AnyRoom, lights: Lights, moves: Mapping[str, str]) -> AnyRoom:
@@ -102,8 +109,15 @@ def lit(room: AnyRoom, lights: Lights, moves: Mapping[str, str]) -> AnyRoom:
 
     A still has one of its own; the frames of a path share one, or it moves. moves: "camera", "light" or "both", by the
     name of the path. The light of a still depends on the seed and its number alone, that of a path on its place among
-    the paths.
+    the paths. Raises RejectedRoom where an area light has no place or no way.
     """
+    try:
+        return replace(room, lightings=_lightings(room, lights, moves))
+    except RejectedRoom as refusal:
+        raise _named(room, refusal) from None
+
+
+def _lightings(room: Room | ImportedRoom, lights: Lights, moves: Mapping[str, str]) -> tuple[Lighting, ...]:
     lightings: list[Lighting] = []
     paths = 0
     for path, group in groupby(room.cameras, key=lambda camera: camera.path):
@@ -118,7 +132,14 @@ def lit(room: AnyRoom, lights: Lights, moves: Mapping[str, str]) -> AnyRoom:
             lightings += [lights.one(rng, cameras)] * len(cameras)
         else:
             lightings += lights.moving(rng, cameras)
-    return replace(room, lightings=tuple(lightings))
+    return tuple(lightings)
+
+
+def _named(room: Room | ImportedRoom, refusal: RejectedRoom) -> RejectedRoom:
+    """The refusal, which names the file where the room is one of several scenes."""
+    if isinstance(room, Room):
+        return refusal
+    return type(refusal)(f"{room.scene.tree.file}: {refusal.reason}", refusal.advice)
 
 
 def _rng(room: Room | ImportedRoom, *number: int) -> np.random.Generator:

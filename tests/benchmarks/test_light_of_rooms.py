@@ -56,6 +56,8 @@ def test_a_run(tmp_path):
 
     (record,) = (folder.read_result(id) for id in folder.ids())
     assert [tags[:2] for tags in record["tags"]] == [["stills", "near"], ["stills", "far"], ["stills", "far"]]
+    # Lighting the scene anew takes its time, beside the clock of the method.
+    assert all(frame["lighting_seconds"] > 0 for frame in record["frames"])
     boards = Runs([load(root)]).frames
     groups = boards[boards["metric"] == "rmse"].groupby("part")["value"].count()
     assert (groups["full:near"], groups["full:far"], groups["full:stills"]) == (1, 2, 3)

@@ -39,7 +39,6 @@ def test_the_presets_of_the_walkthrough_are_what_the_issue_asks_for():
         assert again.sample_seed != reference.sample_seed
         assert again.model_copy(update={"sample_seed": reference.sample_seed}) == reference
         assert {*MOVING, *(c for part in track.parts for c in CHANNELS_OF[part])} <= set(reference.channels)
-        # Methods trace as far as gibench does where it is not told; nothing may ask for more.
         assert reference.max_depth == training.max_depth == MAX_DEPTH
 
 
@@ -105,18 +104,19 @@ def test_unknown_tracks_presets_and_files(tmp_path):
         load_track(str(tmp_path / "bad.toml"))
 
 
+def sizes(name: str, preset: str = "cpu") -> tuple[list[int], list[int], tuple[int, int]]:
+    """Rooms to train on and frames of each, frames of each room that is scored, and the size of them all."""
+    size = load_track(name).preset(preset)
+    training, reference = size.recipe("training"), size.recipe("reference")
+    return (
+        [training.rooms, len(training.rendered_views())],
+        [len(reference.rendered_views(room=room)) for room in range(reference.rooms)],
+        training.resolution,
+    )
+
+
 def test_the_presets_of_the_tracks_with_other_light_and_other_rooms():
     """What is trained on and what is scored at the size of two cores."""
-
-    def sizes(name: str) -> tuple[list[int], list[int], tuple[int, int]]:
-        preset = load_track(name).preset("cpu")
-        training, reference = preset.recipe("training"), preset.recipe("reference")
-        return (
-            [training.rooms, len(training.rendered_views())],
-            [len(reference.rendered_views(room=room)) for room in range(reference.rooms)],
-            training.resolution,
-        )
-
     assert sizes("moving-light") == ([2, 1000], [60 + 24 + 24] * 2, (128, 128))
     assert sizes("relight") == ([2, 500], [40 + 24 + 24] * 2, (128, 128))
     assert sizes("unseen-rooms") == ([200, 4], [3 + 16] * 4 + [3] * 20, (192, 128))
@@ -125,6 +125,24 @@ def test_the_presets_of_the_tracks_with_other_light_and_other_rooms():
         assert track.parts == ("full", "indirect")
         assert {"mae", "mse", "psnr", "ssim", "lpips_alex"} <= set(track.metrics)
         assert "warping_error" in track.sequence_metrics
+
+
+def test_the_presets_for_the_papers_have_their_sizes():
+    """Gao et al. 2022, sections 3.7.2 and 4.1; Raghavan et al. 2023, section 5; Gai et al., sections 4 to 5.2.
+
+    Sequences come on top: two of 120 frames, and paths of 60 in ten rooms.
+    """
+    # Eight scenes with 5000 images each, and 100 of new views and lights.
+    assert sizes("moving-light", "paper") == ([8, 5000], [100 + 120 + 120] * 8, (256, 256))
+    # Four scenes with 4000 images each.
+    assert sizes("relight", "paper") == ([4, 4000], [200 + 120 + 120] * 4, (512, 512))
+    # 30,000 images of 1500 layouts, and 1000 of others.
+    assert sizes("unseen-rooms", "paper") == ([1500, 20], [20 + 60] * 10 + [20] * 40, (768, 512))
+    training, reference = (
+        load_track("moving-light").preset("paper").recipe(r) for r in ("training", "reference")
+    )
+    assert training.spp == 1024
+    assert training.max_depth == reference.max_depth == 16
 
 
 def test_relight_trains_on_real_and_rendered_maps_and_is_scored_near_and_far(tmp_path):

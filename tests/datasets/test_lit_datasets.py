@@ -21,6 +21,7 @@ from gibench.generators.scene_files import lighting_record
 from gibench.rendering.lighting import AreaLight, EnvironmentMap, Lighting
 from gibench.rendering.panoramas import Panorama
 from tests.datasets.test_real_dataset import frames_of
+from tests.generators.imported.files import room_file
 
 TINY = ["--resolution", "16x12", "--spp", "2"]
 MOVING = """
@@ -184,6 +185,31 @@ def test_a_folder_that_lights_nothing_ends_in_one_line_and_leaves_nothing(tmp_pa
     assert not (tmp_path / "data").exists()
 
 
+def test_frames_of_a_scene_file_have_a_light_each_too(tmp_path, maps):
+    """Its lamp is dark, so that all light is that of the frame: through the open ceiling, or from the rectangle."""
+    scene = room_file(tmp_path / "scene")
+    words = ["--scene", str(scene), "--views", "1", *TINY, "--channels", "radiance"]
+    area, sky = tmp_path / "area", tmp_path / "sky"
+    assert run(make_app, [*words, "--lighting", "area-light", "--out", str(area)]) == 0
+    lit = ["--environments", str(maps), "--opened", "ceiling"]
+    assert run(make_app, [*words, *lit, "--out", str(sky)]) == 0
+    for root in (area, sky):
+        assert verify(root) == []
+        frames = list(open_dataset(root))
+        assert len(frames) == 2  # the scene's own camera, and the view
+        assert len({frame.lighting for frame in frames}) == 2
+        assert all(frame["color"].any() for frame in frames)
+    dataset = open_dataset(area)
+    assert [frame.lighting.kind for frame in dataset] == ["area-light"] * 2
+    assert dataset.names(0)[1][-1] == "area_light"
+    for frame in dataset:
+        x, y, z = frame.lighting.area.centre
+        assert abs(x) < 2.5
+        assert abs(y) < 3
+        assert 0 < z < 2.7
+    assert {frame.lighting.environment.panorama.name for frame in open_dataset(sky)} <= {"a", "b"}
+
+
 def test_lights_survive_the_table(tmp_path):
     panorama = Panorama.of("a", np.ones((4, 8, 3)))
     for lighting in (
@@ -207,6 +233,13 @@ def test_lights_survive_the_table(tmp_path):
         ({"lighting": "moon"}, "'moon' is not allowed"),
         ({"environments": ["indoor"]}, "set lighting"),
         ({"lighting": "environments", "environments": ["indor"]}, "did you mean indoor"),
+        ({"lighting": "area-light", "kinds": ["still-life"]}, "kinds has still-life, which an environment"),
+        ({"lighting": "area-light", "kinds": ["office", "still-life"]}, "set lighting to .environments"),
+        (
+            {"lighting": "area-light", "sampling": "guided"},
+            "sampling is .guided., but .* holds for one light",
+        ),
+        ({"lighting": "environments", "sampling": "guided"}, "set lighting to .own."),
         ({"path": "walk", "path_moves": "light"}, "keeps its own"),
         ({"lighting": "area-light", "path_moves": "light"}, "needs a path"),
         ({"lighting": "area-light", "path": "walk", "sequences": {"a": {"views": 2}}}, "both set"),

@@ -4,7 +4,14 @@ from PIL import Image
 
 from gibench.datasets import open_dataset
 from gibench.datasets.channel_pictures import id_colors, picture_of, scale_colors
-from gibench.datasets.previews import SHEET_FRAMES, SHEET_WIDTH, contact_sheet, frame_panel
+from gibench.datasets.previews import (
+    SHEET_FRAMES,
+    SHEET_WIDTH,
+    contact_sheet,
+    frame_panel,
+    grid,
+    remark_of,
+)
 from gibench.rendering.channels import CHANNELS
 from tests.datasets.fakes import pixels
 
@@ -60,6 +67,35 @@ def test_a_sheet_shows_as_many_rooms_as_it_can(rooms_made):
     assert np.asarray(sheet).std() > 10
     assert contact_sheet(rooms_made, table.head(1)).width < 2 * SHEET_WIDTH
     assert len(table) < SHEET_FRAMES
+
+
+def test_a_remark_names_the_sequence_and_the_map_where_there_is_one():
+    still = {"kind": "office", "path": ""}
+    assert remark_of(still) == "office"
+    assert remark_of(still | {"lighting": "area-light", "environment": ""}) == "office"
+    assert remark_of(still | {"environment": "esplanade"}) == "esplanade, office"
+    assert remark_of(still | {"path": "turning", "environment": "lebombo"}) == "turning, lebombo, office"
+    assert remark_of({"kind": "a\nb\r", "path": ""}) == "a b"  # of a stranger
+
+
+def written_at(sheet, tile):
+    """Columns of a sheet with text in them, in the rows above the first tile."""
+    above = np.asarray(sheet)[: sheet.height - tile.height - 6].max(axis=(0, 2))
+    return np.flatnonzero(above > 60)
+
+
+def test_a_remark_is_written_whatever_its_length_and_stays_above_its_tile():
+    tile = Image.new("RGB", (SHEET_WIDTH, 20))
+    title, short, long = "room 0  view 10", "office", "turning, st_peters_square_night, dining-kitchen"
+    alone = written_at(grid([(tile, title, "")], 1), tile)
+    assert written_at(grid([(tile, title, short)], 1), tile).max() > alone.max()
+    bare, whole, cut = (grid([(tile, title, remark)], 1) for remark in ("", long[:25], 3 * long))
+    assert whole.height == cut.height > bare.height
+    for sheet in (whole, cut):
+        assert written_at(sheet, tile).max() > alone.max()
+        assert written_at(sheet, tile).max() <= 6 + SHEET_WIDTH
+    # One that is long moves those of all tiles, which stay in line.
+    assert grid([(tile, title, short), (tile, title, long)], 2).height == whole.height
 
 
 def test_a_panel_shows_every_channel(rooms_made):

@@ -251,6 +251,20 @@ def test_a_scene_without_a_place_for_cameras_does_not_stop_the_others(scene, tmp
     assert "no place for a camera" in capsys.readouterr().err
 
 
+def test_an_open_scene_that_no_area_light_fits_in_does_not_stop_the_others(scene, tmp_path, capsys):
+    """It has a camera of its own, so that nothing but the light asks for its free space."""
+    look = '<lookat origin="0, -3, 2" target="0, 0, 0" up="0, 0, 1"/>'
+    camera = f'<sensor type="perspective"><transform name="to_world">{look}</transform></sensor>'
+    flat = written(tmp_path / "flat", camera + SQUARE + '<emitter type="constant"/>', version="3.0.0")
+    words = ["--lighting", "area-light", "--views", "0", *SMALL, "--scene", str(flat)]
+    assert run(make_app, [*words, "--scene", str(scene), "--out", str(tmp_path / "d")]) == 0
+    manifest = read_manifest(tmp_path / "d")
+    assert set(open_dataset(tmp_path / "d").frames["room"]) == {1}
+    assert f"{flat}: no place for an area light; nothing is enclosed" in json.dumps(manifest)
+    assert "left out      room 0: " in capsys.readouterr().out.replace("\n", " ")
+    assert f"{flat}: no place for an area light" in refused(capsys, *words, "--out", tmp_path / "e")
+
+
 def test_a_scene_that_mitsuba_refuses_is_a_mistake_of_its_author(tmp_path, capsys):
     bad = '<shape type="sphere"><bsdf type="diffuse"><float name="nobody" value="1"/></bsdf></shape>'
     camera = '<sensor type="perspective"><transform name="to_world"><translate z="5"/></transform></sensor>'

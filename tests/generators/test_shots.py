@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from gibench.generators.area_lights import NoPlaceForLight
 from gibench.generators.imported.room import ImportedRoom
 from gibench.generators.parts import Camera
 from gibench.generators.shots import TURN, Environments, lit, shot_before, shot_of
@@ -61,6 +63,23 @@ def test_the_frame_before_is_that_of_the_same_path():
     assert shot_before(made, 2) == shot_of(made, 1)
     assert shot_of(made, 1).lighting == made.lightings[1]
     assert shot_of(replace(made, lightings=()), 1).lighting == Lighting()
+
+
+class Nowhere:
+    """Source of a light that has no place."""
+
+    def one(self, rng, cameras):
+        raise NoPlaceForLight("no place for an area light", "leave this room out")
+
+    moving = one
+
+
+@pytest.mark.parametrize("paths", [("",), ("a", "a")])
+def test_a_light_without_a_place_names_the_scene_file(paths):
+    scene = SimpleNamespace(tree=SimpleNamespace(file="barn/scene.xml"))
+    said = r"^room rejected: barn/scene\.xml: no place for an area light; leave this room out$"
+    with pytest.raises(NoPlaceForLight, match=said):
+        lit(replace(room(*paths), scene=scene), Nowhere(), {"a": "light"})
 
 
 def test_stills_have_one_of_a_few_rotations_but_maps_still_turn():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import time
 from functools import partial
 from pathlib import Path
@@ -17,6 +18,7 @@ from gibench.rendering.panoramas import Panorama
 from gibench.rendering.render import render_frame
 from gibench.rendering.scene import load_scene
 from tests.performance.turns import seconds
+from tests.rendering.test_light_rig import kernels_compiled
 
 pytestmark = pytest.mark.performance
 
@@ -64,19 +66,40 @@ def test_a_move_or_a_swap(loaded, kind):
     import drjit as dr
 
     assert loaded.rig is not None
+    camera = shot_of(loaded.room, 0).camera
     wall, cpu = [], []
-    for lighting in lightings(kind):
+
+    def moved(lighting):
+        """Light the scene anew, which is timed, and render what it shows, which is not."""
         dr.sync_thread()
         start, spent = time.perf_counter(), time.process_time()
         loaded.rig.set(lighting)
         dr.sync_thread()
         wall.append(time.perf_counter() - start)
         cpu.append(time.process_time() - spent)
+        channels = ("radiance", "surface", "lighting")
+        render_frame(loaded.scene, camera, resolution=(16, 16), spp=4, channels=channels)
+
+    def recordings():
+        return [replay.recordings for replay in loaded.scene.replays.values()]
+
+    first, others = lightings(kind)[:2], lightings(kind)[2:]
+    gc.collect()  # scenes that die in between change what kernels call
+    with kernels_compiled():  # recordings are told apart by such settings too
+        for lighting in first:
+            moved(lighting)
+    before = recordings()
+    with kernels_compiled() as compiled:
+        for lighting in others:
+            moved(lighting)
+        after = recordings()
     print(
         f"\n{kind}: {1e3 * np.median(wall[2:]):.0f} ms (median of {FRAMES}; {1e3 * np.median(cpu[2:]):.0f} ms of CPU; "
-        f"{len(loaded.scene.shapes)} shapes)"
+        f"{len(loaded.scene.shapes)} shapes), {compiled[0]} kernels compiled, {sum(after) - sum(before)} recordings"
     )
     assert np.median(cpu[2:]) <= 0.06
+    assert compiled == [0]
+    assert after == before
 
 
 @pytest.mark.parametrize("denoise", [False, True])

@@ -62,7 +62,7 @@ class RejectedRoom(GibenchError):
     def __init__(self, reason: str, advice: str = "the next try draws everything again") -> None:
         """advice: what can be done, for the message."""
         super().__init__(f"room rejected: {reason}; {advice}")
-        self.reason = reason
+        self.reason, self.advice = reason, advice
 
 
 @dataclass(frozen=True, eq=False)
