@@ -23,7 +23,7 @@ from gibench.baselines.vertex_features.implementation import MESH
 from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.lighting import EnvironmentMap, Lighting, Shot
 from gibench.rendering.panoramas import HEIGHT, Panorama
-from tests.baselines.material_strips import CAMERA, strips_parts, strips_rig
+from tests.baselines.material_strips import CAMERA, POLISHED, STRIPS, WALL, strips_parts, strips_rig
 from tests.baselines.meshes import write_glb
 from tests.baselines.sites import site
 
@@ -94,6 +94,13 @@ def frame(rig, method, light, resolution=RESOLUTION, camera=CAMERA):
     return found
 
 
+def signed(method, light):
+    """Indirect light before what is negative is cut off."""
+    images = method._surfaces.read(CAMERA, RESOLUTION)
+    view = View(Shot(CAMERA), None, RESOLUTION, 0, 0)
+    return method.signed(images, view, method.told(method.light_of(light))).cpu().numpy()
+
+
 def lamp(radiance, rows=1):
     pixels = np.full((HEIGHT, 2 * HEIGHT, 3), 1e-3, np.float32)
     pixels[20 : 20 + rows, 30 : 30 + rows] = radiance
@@ -111,6 +118,27 @@ MAPS = {
 @pytest.mark.parametrize("pixels", MAPS.values(), ids=MAPS)
 def test_hard_environments_give_finite_light(rig, method, pixels):
     frame(rig, method, environment(pixels))
+
+
+ROOMS = {
+    "all matt": {"strips": {"matt": STRIPS["matt"]}, "rest": WALL},
+    "all polished": {"strips": POLISHED, "rest": POLISHED["mirror"]},
+}
+
+
+@pytest.mark.parametrize("denoise", [False, True], ids=["plain", "denoised"])
+@pytest.mark.parametrize("materials", ROOMS.values(), ids=ROOMS)
+@pytest.mark.parametrize("name", METHODS)
+def test_rooms_without_gloss_and_of_nothing_else(name, materials, denoise, tmp_path):
+    """Under a sun too, which mirrors and metal of roughness .005 show as it is."""
+    rig = strips_rig(panoramas=True, **materials)
+    method = prepared(name, rig, tmp_path, denoise=denoise)
+    for pixels in (noise(), MAPS["sun"]):
+        assert frame(rig, method, environment(pixels)).color.any()
+    # A network that has learned nothing may say less than nothing of all polished things.
+    one, scaled = (signed(method, environment(scale * noise())) for scale in (1, 2.0**13))
+    assert one.any()
+    np.testing.assert_allclose(scaled, 2.0**13 * one, rtol=1e-5, atol=2.0**13 * 1e-7)
 
 
 def test_a_whole_turn_changes_nothing(rig, method):
