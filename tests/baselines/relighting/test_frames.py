@@ -155,12 +155,18 @@ def test_brighter_light_is_as_much_brighter_light(rig, method):
         np.testing.assert_allclose(scaled, scale * one, rtol=1e-5, atol=1e-7 * scale)
 
 
-def test_a_black_environment_gives_black(method):
-    images = method._surfaces.read(CAMERA, RESOLUTION)
-    black = 0 * method.light_of(environment(noise()))
-    found = method.signed(images, View(Shot(CAMERA), None, RESOLUTION, 0, 0), method.told(black))
-    assert found.shape == (32, 40, 3)
-    assert not found.any()
+@pytest.mark.parametrize("denoise", [False, True], ids=["plain", "denoised"])
+def test_a_black_environment_gives_black(rig, method, denoise):
+    """Direct light too, and what a denoiser makes of both; and numbers of a frame that are numbers."""
+    black = environment(np.zeros((HEIGHT, 2 * HEIGHT, 3)))
+    method.adjust({**method.settings, "denoise": denoise})
+    try:
+        found = frame(rig, method, black)
+    finally:
+        method.adjust({**method.settings, "denoise": False})
+    assert not found.color.any()
+    assert not found.indirect.any()
+    assert np.isfinite(list(found.extra.values())).all()
 
 
 def test_pixels_that_see_no_surface_have_no_indirect_light(rig, method):
