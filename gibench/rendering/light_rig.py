@@ -180,18 +180,29 @@ class LightRig:
         self._put(f"{RECTANGLE}.emitter.radiance.value", mi.Color3f(list(shown.radiance)))
 
     def _set_sky(self, lighting: Lighting) -> bool:
-        """Returns whether the sky gives light."""
+        """Returns whether light is drawn from the sky.
+
+        A black environment is dark by its scale, and drawn by what was there before: recordings of others serve it.
+        """
         environment, own = lighting.environment, self._own_sky
         assert own is not None
-        bright = environment is not None or (lighting.kind == "own" and own.bright)
-        self._put(f"{SKY}.scale", mi.Float(own.scale if environment is None and bright else float(bright)))
-        if environment is not None:
-            self._put(f"{SKY}.data", mi.TensorXf(_around(for_envmap(environment.panorama.pixels))))
-            self._put(f"{SKY}.to_world", _transform(environment.to_world))
-        elif bright or self.lighting is None:
-            self._put(f"{SKY}.data", mi.TensorXf(own.pixels))
-            self._put(f"{SKY}.to_world", _transform(own.to_world))
-        return bright
+        pixels, to_world = None, own.to_world
+        if environment is None:
+            drawn = lighting.kind == "own" and own.bright
+            scale = own.scale if drawn else 0.0
+            if drawn or self.lighting is None:
+                pixels = own.pixels
+        else:
+            drawn, to_world = True, environment.to_world
+            bright = bool(environment.panorama.pixels.any())
+            scale = float(bright)
+            if bright:
+                pixels = _around(for_envmap(environment.panorama.pixels))
+        self._put(f"{SKY}.scale", mi.Float(scale))
+        if pixels is not None:
+            self._put(f"{SKY}.data", mi.TensorXf(pixels))
+            self._put(f"{SKY}.to_world", _transform(to_world))
+        return drawn
 
     def _switch(self, own: bool, area: bool, sky: bool) -> None:
         """Turn lights on and off, and with them their sampling."""

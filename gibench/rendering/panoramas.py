@@ -37,7 +37,7 @@ class Panorama:
 
     @classmethod
     def of(cls, name: str, pixels: NDArray[Any]) -> Panorama:
-        """From pixels (H, 2·H, 3), W·m⁻²·sr⁻¹ in linear Rec. 709, finite, ≥ 0 and not black. Raises PanoramaError."""
+        """From pixels (H, 2·H, 3), W·m⁻²·sr⁻¹ in linear Rec. 709, finite, ≥ 0; may be black. Raises PanoramaError."""
         values = np.array(_checked(name, np.asarray(pixels)), dtype=np.float32, order="C")
         values.setflags(write=False)
         return cls(name, digest(values), values)
@@ -71,6 +71,4 @@ def _checked(name: str, pixels: NDArray[Any]) -> NDArray[Any]:
         raise PanoramaError(
             f"panorama {name}: {broken} values are negative or not finite; mend it or use another"
         )
-    if not pixels.any():
-        raise PanoramaError(f"panorama {name}: it is black; use one that gives light")
     return pixels

@@ -33,20 +33,31 @@ STRIPS: dict[str, dict[str, Any]] = {
 """Materials of the floor, from left to right: those that rooms have."""
 
 
-def strips_rig(*, panoramas: bool = False) -> LightRig:
-    width = 3.0 / len(STRIPS)
+WALL = scenes.two_sided(type="diffuse", reflectance=scenes.rgb(0.6))
+
+POLISHED: dict[str, dict[str, Any]] = {
+    "mirror": scenes.MATERIALS["mirror"],
+    "polished metal": scenes.two_sided(type="roughconductor", material="Cu", alpha=0.005, distribution="ggx"),
+}
+"""A mirror, and what is nearly one."""
+
+
+def strips_rig(
+    *, panoramas: bool = False, strips: dict[str, dict[str, Any]] = STRIPS, rest: dict[str, Any] = WALL
+) -> LightRig:
+    """strips: materials of the floor, from left to right. rest: of the wall and the box."""
+    width = 3.0 / len(strips)
     parts = {
         name.replace(" ", "_"): scenes.rectangle(
             [-1.5 + (k + 0.5) * width, 0, 0], [0, 0, 1], (width / 2, 1.5), bsdf=material
         )
-        for k, (name, material) in enumerate(STRIPS.items())
+        for k, (name, material) in enumerate(strips.items())
     }
-    wall = scenes.two_sided(type="diffuse", reflectance=scenes.rgb(0.6))
-    parts["wall"] = scenes.rectangle([0, 1.5, 1], [0, -1, 0], (1.5, 1), bsdf=wall)
+    parts["wall"] = scenes.rectangle([0, 1.5, 1], [0, -1, 0], (1.5, 1), bsdf=rest)
     parts["box"] = {
         "type": "cube",
         "to_world": mi.ScalarTransform4f().translate([0.2, 0.3, 0.25]).scale([0.5, 0.15, 0.25]),
-        "bsdf": wall,
+        "bsdf": rest,
     }
     return LightRig(load_dict({"type": "scene", **parts}), panoramas=panoramas)
 

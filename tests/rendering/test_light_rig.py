@@ -13,6 +13,7 @@ from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.latlong import for_envmap
 from gibench.rendering.light_rig import LightRig
 from gibench.rendering.lighting import AreaLight, EnvironmentMap, Lighting, LightingError
+from gibench.rendering.panoramas import Panorama
 from gibench.rendering.render import render_frame
 from gibench.rendering.scene import load_dict
 from tests.rendering.scenes import CAMERA, MATERIALS, area, box, rectangle, rgb
@@ -273,6 +274,27 @@ def test_a_dark_scene_is_black_and_may_be_lit():
     assert image(rig.scene, spp=16)["color"].any()
     rig.set(Lighting())
     assert not image(rig.scene, spp=16)["color"].any()
+
+
+@pytest.mark.parametrize("before", [None, SKIES[0], AREA[0]], ids=lambda value: value and value.kind)
+def test_a_black_environment_is_black_and_leaves_others_as_they_were(before):
+    gc.collect()
+    rig = LightRig(load_dict(box("coat")))
+    black = Lighting(environment=EnvironmentMap(Panorama.of("night", np.zeros((SIZE[1], SIZE[0], 3)))))
+    if before is not None:
+        rig.set(before)
+    with kernels_compiled():  # recordings are told apart by such settings too
+        rig.set(black)
+        found = image(rig.scene, spp=16)
+    assert not any(found[name].any() for name in ("color", "emission", "color_se"))
+    with kernels_compiled() as compiled:
+        rig.set(SKIES[1])
+        after = image(rig.scene, spp=16)
+    assert compiled == [0]
+    assert {kernel.recordings for kernel in rig.scene.replays.values()} == {1}
+    fresh = LightRig(load_dict(box("coat")))
+    fresh.set(SKIES[1])
+    np.testing.assert_array_equal(after["color"], image(fresh.scene, spp=16)["color"])
 
 
 def test_what_a_rig_cannot_do_is_said_in_one_line():

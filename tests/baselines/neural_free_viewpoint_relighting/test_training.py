@@ -5,14 +5,12 @@ from __future__ import annotations
 import dataclasses
 
 import pytest
-import torch
 
 from gibench.baselines.neural_free_viewpoint_relighting import METHOD
 from gibench.baselines.neural_free_viewpoint_relighting.draws import Important
 from gibench.baselines.neural_free_viewpoint_relighting.network import FULL, HashField
 from gibench.baselines.neural_free_viewpoint_relighting.training import TrainingPlan, WaveletTransport
 from gibench.baselines.training.budget import Budget
-from gibench.baselines.training.checkpoints import Checkpoint
 from gibench.baselines.training.loop import train
 from tests.baselines.neural_free_viewpoint_relighting.made import FACES, Made
 
@@ -27,37 +25,15 @@ def learner_of(examples, apart, made):
     return WaveletTransport(made.network(lambda size: HashField(size, 12)), examples, apart, made)
 
 
-def learnt(steps, checkpoint=None, **settings):
+def learnt(steps, **settings):
     learner = learner_of(Made(), Made(2, first=100), plan(**settings))
     drawn = learner.batches()
-    return train(learner, drawn, Budget(steps=steps, look_every=steps), seed=3, checkpoint=checkpoint)
+    return train(learner, drawn, Budget(steps=steps, look_every=steps), seed=3)
 
 
 def test_it_learns_the_transport_of_light_that_it_never_saw():
     trained = learnt(80)
     assert trained.best.error < 0.6 * trained.curve[0].error
-
-
-def test_it_repeats_to_the_bit_also_where_it_was_cut_off(tmp_path):
-    whole = learnt(8)
-    learner = learner_of(Made(), Made(2, first=100), plan())
-    budget = Budget(steps=8, look_every=8)
-
-    def until(last):
-        def begin(first):
-            for number, batch in enumerate(learner.batches()(first), first):
-                if number == last:
-                    raise KeyboardInterrupt
-                yield batch
-
-        return begin
-
-    checkpoint = Checkpoint(tmp_path / "state", {"of": "test"}, every=0)
-    with pytest.raises(KeyboardInterrupt):
-        train(learner, until(5), budget, seed=3, checkpoint=checkpoint)
-    again = learnt(8, Checkpoint(tmp_path / "state", {"of": "test"}, every=0))
-    for name, tensor in whole.weights["network"].items():
-        assert torch.equal(tensor, again.weights["network"][name]), name
 
 
 @pytest.mark.parametrize("variant", [None, *METHOD.variants], ids=lambda variant: variant and variant.name)

@@ -23,7 +23,7 @@ from gibench.baselines.vertex_features.implementation import MESH
 from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.lighting import EnvironmentMap, Lighting, Shot
 from gibench.rendering.panoramas import HEIGHT, Panorama
-from tests.baselines.material_strips import CAMERA, strips_parts, strips_rig
+from tests.baselines.material_strips import CAMERA, POLISHED, STRIPS, WALL, strips_parts, strips_rig
 from tests.baselines.meshes import write_glb
 from tests.baselines.sites import site
 
@@ -94,6 +94,13 @@ def frame(rig, method, light, resolution=RESOLUTION, camera=CAMERA):
     return found
 
 
+def signed(method, light):
+    """Indirect light before what is negative is cut off."""
+    images = method._surfaces.read(CAMERA, RESOLUTION)
+    view = View(Shot(CAMERA), None, RESOLUTION, 0, 0)
+    return method.signed(images, view, method.told(method.light_of(light))).cpu().numpy()
+
+
 def lamp(radiance, rows=1):
     pixels = np.full((HEIGHT, 2 * HEIGHT, 3), 1e-3, np.float32)
     pixels[20 : 20 + rows, 30 : 30 + rows] = radiance
@@ -113,6 +120,27 @@ def test_hard_environments_give_finite_light(rig, method, pixels):
     frame(rig, method, environment(pixels))
 
 
+ROOMS = {
+    "all matt": {"strips": {"matt": STRIPS["matt"]}, "rest": WALL},
+    "all polished": {"strips": POLISHED, "rest": POLISHED["mirror"]},
+}
+
+
+@pytest.mark.parametrize("denoise", [False, True], ids=["plain", "denoised"])
+@pytest.mark.parametrize("materials", ROOMS.values(), ids=ROOMS)
+@pytest.mark.parametrize("name", METHODS)
+def test_rooms_without_gloss_and_of_nothing_else(name, materials, denoise, tmp_path):
+    """Under a sun too, which mirrors and metal of roughness .005 show as it is."""
+    rig = strips_rig(panoramas=True, **materials)
+    method = prepared(name, rig, tmp_path, denoise=denoise)
+    for pixels in (noise(), MAPS["sun"]):
+        assert frame(rig, method, environment(pixels)).color.any()
+    # A network that has learned nothing may say less than nothing of all polished things.
+    one, scaled = (signed(method, environment(scale * noise())) for scale in (1, 2.0**13))
+    assert one.any()
+    np.testing.assert_allclose(scaled, 2.0**13 * one, rtol=1e-5, atol=2.0**13 * 1e-7)
+
+
 def test_a_whole_turn_changes_nothing(rig, method):
     one, turned = (frame(rig, method, environment(noise(), turn)).indirect for turn in (0.0, 2 * np.pi))
     np.testing.assert_allclose(one, turned, rtol=1e-5, atol=1e-6 * one.max())
@@ -127,12 +155,18 @@ def test_brighter_light_is_as_much_brighter_light(rig, method):
         np.testing.assert_allclose(scaled, scale * one, rtol=1e-5, atol=1e-7 * scale)
 
 
-def test_a_black_environment_gives_black(method):
-    images = method._surfaces.read(CAMERA, RESOLUTION)
-    black = 0 * method.light_of(environment(noise()))
-    found = method.signed(images, View(Shot(CAMERA), None, RESOLUTION, 0, 0), method.told(black))
-    assert found.shape == (32, 40, 3)
-    assert not found.any()
+@pytest.mark.parametrize("denoise", [False, True], ids=["plain", "denoised"])
+def test_a_black_environment_gives_black(rig, method, denoise):
+    """Direct light too, and what a denoiser makes of both; and numbers of a frame that are numbers."""
+    black = environment(np.zeros((HEIGHT, 2 * HEIGHT, 3)))
+    method.adjust({**method.settings, "denoise": denoise})
+    try:
+        found = frame(rig, method, black)
+    finally:
+        method.adjust({**method.settings, "denoise": False})
+    assert not found.color.any()
+    assert not found.indirect.any()
+    assert np.isfinite(list(found.extra.values())).all()
 
 
 def test_pixels_that_see_no_surface_have_no_indirect_light(rig, method):
