@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 import trimesh
@@ -90,6 +92,51 @@ def test_memory_is_bounded(monkeypatch):
     mesh = even_mesh([fine, quad()], ROOM, 0.001)
     assert len(mesh.vertices) < 1500
     assert area(mesh) == pytest.approx(fine.area + 2, rel=0.12)
+
+
+def peak_of(part, box):
+    """Bytes that NumPy holds at most while a part is remeshed."""
+    tracemalloc.start()
+    try:
+        mesh = even_mesh([part], box, 0.1)
+        return tracemalloc.get_traced_memory()[1], mesh
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.mark.parametrize("box", [ROOM, Box((-5.0, -5.0, -5.0), (5.1, 10.0, 10.0))], ids=["all", "half"])
+def test_memory_does_not_grow_with_the_triangles_of_a_part(monkeypatch, box):
+    monkeypatch.setattr(remeshing, "MOST_TRIANGLES", 4000)
+    few, many = (trimesh.creation.icosphere(level, 0.5) for level in (5, 7))  # 20,480 and 327,680 triangles
+    least, most = peak_of(few, box), peak_of(many, box)
+    assert most[0] < 2 * least[0]
+    assert area(most[1]) == pytest.approx(area(least[1]), rel=0.02)
+
+
+def test_a_small_thing_of_many_triangles_is_kept_by_a_few(monkeypatch):
+    """Of which a cell of half an edge would leave none, and which splitting would leave as it is."""
+    monkeypatch.setattr(remeshing, "MOST_TRIANGLES", 2000)
+    speck = trimesh.creation.icosphere(5, 0.01)
+    mesh = even_mesh([speck], ROOM, 0.1)
+    assert 0.5 < area(mesh) / speck.area < 2
+    assert 20 < len(mesh.triangles) < 4000
+
+
+def test_dust_is_left_out(monkeypatch):
+    """Triangles apart from each other, each within a cell, whose side their area says."""
+    monkeypatch.setattr(remeshing, "MOST_TRIANGLES", 100)
+    random = np.random.default_rng(0)
+    corners = random.uniform(-1e-4, 1e-4, (4000, 3, 3))
+    own = (
+        np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
+        / 2
+    )
+    cell = random.integers(4000, 12_000, (4000, 1, 3)) + 0.5
+    corners += np.array(ROOM.lowest) + cell * np.sqrt(2 * own / 100)
+    dust = trimesh.Trimesh(corners.reshape(-1, 3), np.arange(12_000).reshape(-1, 3), process=False)
+    assert area(even_mesh([dust, quad()], ROOM, 0.2)) == pytest.approx(2, rel=0.05)
+    with pytest.raises(RemeshingError, match="nothing of the scene's meshes"):
+        even_mesh([dust], ROOM, 0.2)
 
 
 def test_a_glb_comes_back_with_z_up(tmp_path):
