@@ -132,8 +132,9 @@ def _pieces(part: trimesh.Trimesh, box: Box) -> Iterator[_Piece]:
 
 def _clustered(pieces: Iterable[_Piece], box: Box, side: float) -> trimesh.Trimesh:
     """One mesh of pieces whose vertices in a cell of a grid become one, in their mean. side: of a cell, metres."""
-    cells, sums, numbers = np.zeros((0, 3), np.int64), np.zeros((0, 3)), np.zeros(0)
-    triangles = np.zeros((0, 3), np.int64)
+    cells, triangles = np.zeros((0, 3), np.int64), np.zeros((0, 3), np.int64)
+    sums: NDArray[np.float64] = np.zeros((0, 3))
+    numbers: NDArray[Any] = np.zeros(0)
     for piece in pieces:
         own = np.floor((piece.vertices - np.array(box.lowest)) / side).astype(np.int64)
         before = len(cells)
