@@ -42,7 +42,7 @@ MATT = {"type": "diffuse", "reflectance": rgb(0.6, 0.4, 0.2)}
 PLASTIC = coat(0.2, 0.5)
 PRINCIPLED = _principled(roughness=0.55, specular=0.5)
 
-BUMPS = {"type": "bitmap", "filename": "bumps.exr", "raw": True}
+BUMPS: dict[str, Any] = {"type": "bitmap", "filename": "bumps.exr", "raw": True}
 """A slope of 1 in 50 over each triangle, as a displacement; `room` writes the picture."""
 
 MATERIALS: dict[str, dict[str, Any]] = {

@@ -40,8 +40,12 @@ def directional_albedo(layers, si, bsdf, active):
 
 
 def _reflected(layers, bsdf, si, sample1, sample2, active):
-    """A sample of the lobes that reflect: of 64 of glass all but one to three go through."""
+    """A sample of the lobes that reflect, and of the holes of masks, without which Mitsuba's masks count as whole.
+
+    Of 64 samples of all lobes of glass all but one to three go through.
+    """
     if layers.principled:
         return sample_specular(layers, bsdf, si, sample1, sample2, active)
-    reflections = lobes_of(flags.NOT_DIFFUSE & ~flags.TRANSMITS)
-    return bsdf.sample(reflections, si, sample1, sample2, active)
+    lobes = mi.BSDFFlags
+    refracted = int(lobes.DeltaTransmission) | int(lobes.GlossyTransmission)
+    return bsdf.sample(lobes_of(flags.NOT_DIFFUSE & ~refracted), si, sample1, sample2, active)
