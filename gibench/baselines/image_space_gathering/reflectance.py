@@ -46,6 +46,5 @@ def _reflected(layers, bsdf, si, sample1, sample2, active):
     """
     if layers.principled:
         return sample_specular(layers, bsdf, si, sample1, sample2, active)
-    lobes = mi.BSDFFlags
-    refracted = int(lobes.DeltaTransmission) | int(lobes.GlossyTransmission)
-    return bsdf.sample(lobes_of(flags.NOT_DIFFUSE & ~refracted), si, sample1, sample2, active)
+    reflections = flags.NOT_DIFFUSE & ~flags.TRANSMITS
+    return bsdf.sample(lobes_of(reflections | int(mi.BSDFFlags.Null)), si, sample1, sample2, active)
