@@ -26,7 +26,7 @@ PLAIN, GUIDED = "plain", "guided"
 
 SAMPLINGS = (PLAIN, GUIDED)
 """Choice of lights and directions: from the materials alone, or also from what is learned of the room first. The
-means are the same; a guide costs some seconds a scene and then about halves the samples that a frame needs."""
+means are the same; a guide costs some seconds a scene, and makes less noise in most rooms and more in some."""
 
 
 class SceneError(GibenchError):

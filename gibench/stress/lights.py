@@ -111,7 +111,7 @@ def behind_a_gap(**light: Any) -> Any:
         "front": rectangle([0.5 + end, 0, 1], [0, 0, -1], (end, 0.005), bsdf=black),
         "back": rectangle([-0.5 - end, 0, 1], [0, 0, -1], (end, 0.005), bsdf=black),
     }
-    return load_dict({"type": "scene", "floor": floor(), **walls, **pieces, **light})
+    return load_dict({"type": "scene", "floor": floor(reach), **walls, **pieces, **light})
 
 
 BELOW = PinholeCamera((0.0, -1.0, 0.5), (0.0, 0.0, 0.0), POINT)
@@ -133,7 +133,6 @@ def sky_behind_a_gap() -> Found:
     opening = np.array([[[-0.5, -0.005, 1.0], [0.0, 0.01, 0.0], [1.0, 0.0, 0.0]]])
     answer = REFLECTANCE * 10.0 * parallel_rectangle(0.5, 0.005, 1.0)
     for what, portals in (("through a portal", opening), ("without portals", None)):
-        # The scene may find that the gap is not worth its samples elsewhere under the ceiling.
         given = replace(scene, openings=portals)
         frame = seen(given, BELOW, max_depth=1, resolution=(64, 64))
         yield mean_check("light", f"radiance of the floor, {what}", frame, answer, FORM_FACTOR)

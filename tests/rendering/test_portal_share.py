@@ -35,6 +35,16 @@ def test_a_sky_alone_is_seen_through_the_windows_and_a_high_sun_is_not():
     assert float(under(behind).portals.fraction[0]) >= 0.25
 
 
+def test_a_gap_in_a_closed_room_is_seen_through():
+    """Three in a thousand directions lead through it; all else that is sampled meets a wall."""
+    from gibench.stress.lights import behind_a_gap
+    from gibench.stress.scenes import constant
+
+    gap = np.array([[[-0.5, -0.005, 1.0], [0.0, 0.01, 0.0], [1.0, 0.0, 0.0]]])
+    scene = replace(behind_a_gap(sky=constant(10.0)), openings=gap)
+    assert float(scene.portals.fraction[0]) == SHARES[-1]
+
+
 @pytest.mark.parametrize("black", [True, False])
 def test_no_light_from_outside_is_no_use_of_portals(black):
     if black:

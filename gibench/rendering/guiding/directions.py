@@ -36,9 +36,10 @@ def square_of(direction):
 
 
 def bin_of(direction):
-    """Number of the bin, mi.UInt32 below BINS, that a unit vector lies in."""
+    """Number of the bin, mi.UInt32 below BINS, that a unit vector lies in; some bin for what is not finite."""
     at = mi.Point2u(dr.clip(square_of(direction) * SIDE, 0, SIDE - 1))
-    return at.y * SIDE + at.x
+    # A NaN passes through `clip`, and tables are gathered at this number.
+    return dr.minimum(at.y * SIDE + at.x, BINS - 1)
 
 
 def direction_in(number, place):

@@ -90,6 +90,8 @@ class Recorder:
         slot = self._lane + (depth - 1) * self._lanes
         active = active & inside & (depth <= DEPTH)
         diffuse = mi.has_flag(bsdf.flags(), mi.BSDFFlags.DiffuseReflection) & (scattering.delta ^ True)
+        # A mesh whose normals are zero has no frame to say a direction in.
+        diffuse &= dr.all(dr.isfinite(scattering.direction))
         dr.scatter(self.place, place, slot, active)
         dr.scatter(self.direction, bin_of(scattering.direction), slot, active & diffuse)
         dr.scatter(self.density, scattering.pdf, slot, active)

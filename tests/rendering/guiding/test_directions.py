@@ -48,3 +48,16 @@ def test_axes_and_poles_have_bins():
     axes = np.concatenate([np.eye(3), -np.eye(3), -0.0 * np.eye(3) + np.eye(3)]).T.astype(np.float32)
     assert (np.array(bin_of(mi.Vector3f(axes))) < BINS).all()
     np.testing.assert_allclose(np.array(direction_of(square_of(mi.Vector3f(axes)))), axes, atol=1e-6)
+
+
+def test_what_is_no_direction_has_a_bin_too():
+    """Tables are gathered at its number."""
+    import mitsuba as mi
+
+    from gibench.rendering.guiding.directions import BINS, bin_of
+
+    nan, inf = np.nan, np.inf
+    strange = np.array(
+        [[nan] * 3, [nan, 0, 1], [0, nan, -1], [inf, 0, 0], [0, 0, 0], [0, 0, 1.001], [2, -2, -2]]
+    )
+    assert (np.array(bin_of(mi.Vector3f(strange.T.astype(np.float32)))) < BINS).all()

@@ -70,7 +70,33 @@ def point_lamp():
     return scene
 
 
+def covered(material):
+    """The box with a floor and a sphere of a material that Mitsuba has and rooms do not."""
+    return {**scenes.box("coat"), "subject": {**COVERINGS[material], "id": "subject"}}
+
+
+GREY = {"type": "diffuse", "reflectance": scenes.rgb(0.5)}
+METAL = {"type": "roughconductor", "alpha": 0.2, "distribution": "ggx"}
+
+COVERINGS = {
+    "plastic": scenes.two_sided(type="plastic", diffuse_reflectance=scenes.rgb(0.4)),
+    "principled": {"type": "principled", "base_color": scenes.rgb(0.5), "roughness": 0.3, "clearcoat": 0.5},
+    "thin": {"type": "principledthin", "base_color": scenes.rgb(0.5), "roughness": 0.3, "diff_trans": 0.6},
+    "blend": {"type": "twosided", "of": {"type": "blendbsdf", "weight": 0.4, "grey": GREY, "metal": METAL}},
+    "mask": {"type": "mask", "opacity": 0.6, "of": {"type": "twosided", "of": GREY}},
+    "normal map": {
+        "type": "twosided",
+        "of": {
+            "type": "normalmap",
+            "normalmap": {"type": "rgb", "value": [0.6, 0.45, 0.95]},
+            "of": GREY,
+        },
+    },
+}
+
+
 SCENES = {
+    **{name: lambda name=name: load_dict(covered(name)) for name in COVERINGS},
     "coat": lambda: load_dict(scenes.box("coat")),
     "metal": lambda: load_dict(scenes.box("metal")),
     "mirror": lambda: load_dict(scenes.box("mirror")),
@@ -208,3 +234,72 @@ def test_a_lamp_behind_a_baffle_has_less_noise(monkeypatch):
         return np.median(np.square(frame(scene)["color_se"].astype(float)))
 
     assert variance(replace(plain, sampling=GUIDED)) < 0.7 * variance(plain)
+
+
+def test_a_mesh_without_normals_does_no_harm(tmp_path):
+    """Zero vertex normals give a frame of NaN: paths end there, and nothing of it is learned."""
+    (tmp_path / "flat.ply").write_text(
+        "ply\nformat ascii 1.0\nelement vertex 3\n"
+        + "".join(f"property float {name}\n" for name in ("x", "y", "z", "nx", "ny", "nz"))
+        + "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+        "-0.9 0.9 0.4 0 0 0\n0.9 0.9 0.4 0 0 0\n0 0.8 1.6 0 0 0\n3 0 1 2\n"
+    )
+    scene = scenes.box("diffuse")
+    scene["flat"] = {
+        "type": "ply",
+        "filename": str(tmp_path / "flat.ply"),
+        "bsdf": {"type": "ref", "id": "wall"},
+    }
+    plain = load_dict(scene)
+    guided = replace(plain, sampling=GUIDED)
+    assert guided.guide is not None
+    one, other = frame(guided, seed=1), frame(plain, seed=2)
+    assert np.isfinite(one["color"]).all()
+    z = z_scores(one, other)
+    assert abs(z.mean()) < 4 / np.sqrt(len(z))
+
+
+def test_the_guide_leaves_glossy_lobes_alone():
+    """Where the specular lobe alone is asked for, as for glossy probes, frames have its own samples: they are those of
+    a guide that chooses no direction."""
+    from gibench.rendering.backend import tracing
+    from gibench.rendering.integrator import scatter_paths
+    from gibench.rendering.sampling import IndependentSampler
+
+    guided = replace(load_dict(scenes.box("coat")), sampling=GUIDED)
+
+    def densities(lobes):
+        import drjit as dr
+        import mitsuba as mi
+
+        found = {}
+
+        class Recorder:
+            def __getattr__(self, name):
+                return lambda *given: None
+
+            def first(self, si, bsdf, scattering, lit, weights, active):
+                found["guided"] = scattering.guided & active
+
+        with tracing():
+            sampler = IndependentSampler()
+            sampler.independent.seed(0, 4096)
+            origin = mi.Point3f(0.5, -0.5, 1.5)
+            ray = mi.Ray3f(dr.repeat(origin, 4096), mi.Vector3f(0, 0, -1))
+            si = guided.mi_scene.ray_intersect(ray)
+            scatter_paths(
+                guided.mi_scene,
+                sampler,
+                si,
+                si.bsdf(ray),
+                mi.Bool(True),
+                max_depth=1,
+                lobes=lobes,
+                guide=guided.guide,
+                recorder=Recorder(),
+            )
+        return np.array(found["guided"]).mean()
+
+    assert densities("specular") == 0
+    assert densities("all") > 0.05
+    assert densities("diffuse") > 0.05

@@ -66,6 +66,28 @@ def test_it_is_the_frame_that_is_split():
         np.testing.assert_allclose(whole, noise.variance, rtol=1e-6)
 
 
+def test_a_frame_of_many_blocks_is_split_too(monkeypatch):
+    """Blocks have seeds of their own, so it is another frame than that of `render_frame`, with its mean and noise."""
+    monkeypatch.setattr("gibench.rendering.noise.splitting.LANES", 1 << 12)
+    scene = load_dict(scenes.box("coat"))
+    options = {"resolution": (24, 16), "spp": 128, "max_depth": 4}
+    variances, means = [], []
+    for seed in range(6):
+        noise = split_noise(scene, scenes.CAMERA, seed=seed, **options)
+        for split in noise.splits.values():
+            whole = sum(term.variance for term in split.terms) + split.covariance
+            np.testing.assert_allclose(whole, noise.variance, rtol=1e-6)
+        variances.append(noise.variance)
+        means.append(noise.mean)
+    frames = [frame(scene, seed=100 + seed, **options) for seed in range(6)]
+    theirs = [arrays["color"].mean((0, 1), dtype=float) for arrays in frames]
+    error = np.sqrt((np.var(means, axis=0, ddof=1) + np.var(theirs, axis=0, ddof=1)) / 6)
+    assert (np.abs(np.mean(means, axis=0) - np.mean(theirs, axis=0)) < 5 * error).all()
+    theirs = [relative_variance(arrays) for arrays in frames]
+    error = np.sqrt((np.var(variances, ddof=1) + np.var(theirs, ddof=1)) / 6)
+    assert abs(np.mean(variances) - np.mean(theirs)) < 5 * error
+
+
 @pytest.mark.parametrize("name", ["guided", "portals"])
 def test_guided_paths_and_portals_are_split_too(name, quick):
     if name == "guided":
