@@ -59,13 +59,15 @@ class Receiver:
     def turned(self, vector: Any) -> Any:
         """A mi.Vector3f of the world in this frame."""
         local = self.si.to_local(vector)
-        c, s = self._cosine, self._sine
-        return mi.Vector3f(c * local.x + s * local.y, c * local.y - s * local.x, local.z * self._side)
+        c, s, side = self._cosine, self._sine, self._side
+        # From behind y turns with z: a frame that is mirrored would run around the light the other way.
+        return mi.Vector3f(c * local.x + s * local.y, (c * local.y - s * local.x) * side, local.z * side)
 
     def for_bsdf(self, vector: Any) -> Any:
         """A mi.Vector3f of this frame as a BSDF takes it."""
-        c, s = self._cosine, self._sine
-        return mi.Vector3f(c * vector.x - s * vector.y, s * vector.x + c * vector.y, vector.z * self._side)
+        c, s, side = self._cosine, self._sine, self._side
+        y = vector.y * side
+        return mi.Vector3f(c * vector.x - s * y, s * vector.x + c * y, vector.z * side)
 
     def form_factor(self, above: list[Edge], transform: Transform | None = None) -> Any:
         """For a cosine or a transformed one, mi.Float in [0, 1]. above: edges of the rectangle over the surface."""

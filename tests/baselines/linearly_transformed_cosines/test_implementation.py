@@ -11,13 +11,18 @@ from gibench.baselines.linearly_transformed_cosines import METHOD
 from gibench.baselines.linearly_transformed_cosines.implementation import AnalyticLight, RectangleLight
 from gibench.baselines.method import MethodError, View
 from gibench.baselines.stages import Stages
+from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.channels import CUES
+from gibench.rendering.light_rig import LightRig
 from gibench.rendering.lighting import AreaLight, Lighting, Shot
 from gibench.rendering.render import render_frame
+from gibench.rendering.scene import load_dict
 from tests.baselines.material_strips import CAMERA, strips_rig
 from tests.baselines.sites import site
+from tests.rendering import scenes
 
 RESOLUTION = (40, 32)
+ABOVE = PinholeCamera((0.0, -2.4, 1.2), (0.0, 0.0, 0.0), np.radians(40.0))
 
 
 @pytest.fixture(scope="module")
@@ -78,6 +83,44 @@ def test_shadows_and_highlights_are_those_of_the_path_tracer(rig, name):
     np.testing.assert_allclose(diffuse + specular, sum(expected), rtol=0.05)
 
 
+FLOORS = {
+    "diffuse": scenes.two_sided(type="diffuse", reflectance=scenes.rgb(0.5)),
+    "dark": scenes.two_sided(type="diffuse", reflectance=scenes.rgb(0.1)),
+    "coated": scenes.two_sided(
+        type="roughplastic", alpha=0.2, distribution="ggx", diffuse_reflectance=scenes.rgb(0.4, 0.2, 0.1)
+    ),
+}
+
+
+def floor(material, normal=1, *, sheet=False):
+    """A floor whose normal is up or down, under a sheet or not."""
+    parts = {"floor": scenes.rectangle([0, 0, 0], [0, 0, normal], (1.5, 1.5), bsdf=FLOORS[material])}
+    if sheet:
+        parts["sheet"] = scenes.rectangle([0, 0, 0.4], [0, 0, 1], (0.3, 0.3), bsdf=FLOORS["diffuse"])
+    return LightRig(load_dict({"type": "scene", **parts}), panoramas=False)
+
+
+def on_floor(rig, light):
+    """Images of direct diffuse and specular light, and of the cues."""
+    rig.set(Lighting(area=light))
+    lit = RectangleLight(rig.scene, cues=True).lit(
+        View(Shot(ABOVE), None, RESOLUTION, 0, 0), light, RESOLUTION, 4, Stages()
+    )
+    return [
+        np.array(part).T.reshape(*RESOLUTION[::-1], 3)
+        for part in (lit.diffuse, lit.specular, *lit.cues.values())
+    ]
+
+
+@pytest.mark.parametrize("material", FLOORS)
+def test_a_floor_whose_normal_is_turned_is_the_same_floor(material):
+    light = AreaLight((0.2, 0.1, 1.8), (0, 0.1, -1), 0.6, 0.6, (5, 4, 3))
+    up, down = (on_floor(floor(material, normal), light) for normal in (1, -1))
+    for one, other in zip(up, down, strict=True):
+        np.testing.assert_allclose(other, one, rtol=0.05, atol=0.02 * one.max())
+        np.testing.assert_allclose(other.mean(), one.mean(), rtol=0.01)
+
+
 def test_a_frame_is_what_is_emitted_and_direct_light(rig, method):
     light = LIGHTS["grazing"]
     emitted, diffuse, specular = reference(rig, light)
@@ -104,7 +147,7 @@ def test_a_light_in_a_wall_and_one_of_huge_radiance_stay_finite(rig, method):
     in_wall = AreaLight((0.0, 1.5, 1.0), (0, -1, 0), 0.6, 0.6, (5, 4, 3))
     assert np.isfinite(frame(rig, method, in_wall).color).all()
     one = frame(rig, method, LIGHTS["above"]).color
-    for scale in (1e-4, 1e5):
+    for scale in (0, 1e-4, 1e5):
         scaled = dataclasses.replace(LIGHTS["above"], radiance=tuple(scale * c for c in (5, 4, 3)))
         np.testing.assert_allclose(frame(rig, method, scaled).color, scale * one, rtol=1e-4)
 
