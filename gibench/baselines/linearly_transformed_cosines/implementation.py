@@ -80,7 +80,7 @@ class RectangleLight:
 @dr.freeze
 def _shadowed(light, colors, sums, disagreement, guides, mirrored, width: int, height: int):
     """Diffuse and specular direct light, and the cues, of which plain surfaces show their own material."""
-    shares = ratios(sums, disagreement, guides, width, height)
+    shares = ratios(sums, colors, disagreement, guides, width, height)
     lit = {name: color * shares[name] * light["radiance"] for name, color in colors.items()}
     diffuse, specular = lit.pop("diffuse"), lit.pop("specular") + mirrored
     cues = [dr.select(guides["plain"], diffuse, cue) for cue in lit.values()]

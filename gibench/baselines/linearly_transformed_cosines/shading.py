@@ -36,7 +36,10 @@ FOLLOWED = int(
 """Lobes for which a ray is followed."""
 
 DARK = 1e-4
-"""Of the radiance of the light: where less would arrive without shadows, the ratio is 1."""
+"""Of the light in closed form: where samples found less of it, they are no measure, and the ratio is 1."""
+
+SMALLEST = 1e-36
+"""Of such sums, whose inverse a float still holds."""
 
 LARGEST_RATIO = 4.0
 """Of a filtered ratio: where samples of the closed form found almost nothing, they are no measure."""
@@ -242,8 +245,10 @@ def _mean_around(values, x, y, columns, rows):
 
 
 @dr.syntax
-def ratios(sums, disagreement, guides, width: int, height: int):
+def ratios(sums, closed, disagreement, guides, width: int, height: int):
     """Light with shadows over light without, by lobe, mi.Float in [0, LARGEST_RATIO].
+
+    closed: by lobe the light that the samples without shadows are to find, mi.Color3f.
 
     A pixel takes as much of its neighbours as the samples around it disagree, from surfaces that go on.
     """
@@ -280,7 +285,7 @@ def ratios(sums, disagreement, guides, width: int, height: int):
         offset += 1
     found = {}
     for name in sums:
-        enough = unlit[name] > DARK
+        enough = unlit[name] > dr.maximum(DARK * luminance(closed[name]), SMALLEST)
         found[name] = dr.clip(dr.select(enough, lit[name] * inverse(unlit[name]), 1), 0, LARGEST_RATIO)
     dr.eval(found)
     return found

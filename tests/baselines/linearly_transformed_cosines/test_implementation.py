@@ -121,6 +121,22 @@ def test_a_floor_whose_normal_is_turned_is_the_same_floor(material):
         np.testing.assert_allclose(other.mean(), one.mean(), rtol=0.01)
 
 
+@pytest.mark.parametrize("material", FLOORS)
+@pytest.mark.parametrize("side", [1e-3, 0.01, 0.05])
+def test_what_a_small_light_does_not_reach_is_dark(side, material):
+    """A thousandth of a light's radiance and less arrives where it is seen whole."""
+    rig = floor(material, sheet=True)
+    light = AreaLight((0, 0, 2.5), (0, 0, -1), side, side, tuple(c / side**2 for c in (5, 4, 3)))
+    found = sum(on_floor(rig, light)[:2])
+    names = ("direct_diffuse", "direct_specular")
+    truth = render_frame(rig.scene, ABOVE, resolution=RESOLUTION, channels=names, spp=256, max_depth=1).arrays
+    truth = sum(truth[name] for name in names)
+    np.testing.assert_allclose(found.mean(), truth.mean(), rtol=0.05)
+    umbra = (truth < 1e-6 * truth.max()).all(axis=2)
+    assert umbra.sum() > 20
+    assert found[umbra].mean() < 0.01 * truth.mean()
+
+
 def test_a_frame_is_what_is_emitted_and_direct_light(rig, method):
     light = LIGHTS["grazing"]
     emitted, diffuse, specular = reference(rig, light)
