@@ -92,7 +92,7 @@ class Method:
     `Implementation`, imported only to run it. channels: of the training views that it reads. knobs: its settings.
     budget: the knob that equal-time comparisons turn. trained: draws random numbers while it is prepared, so that
     several seeds say more than one. trains: has the stage `train`. variants: the ablations that its paper shows,
-    methods of their own on a board.
+    methods of their own on a board. own: of a variant, the knobs that make it one.
     """
 
     id: str
@@ -107,6 +107,7 @@ class Method:
     trained: bool = False
     trains: bool = False
     variants: tuple[Variant, ...] = ()
+    own: tuple[str, ...] = ()
 
     def with_variants(self) -> tuple[Method, ...]:
         """This method and its variants, each a card of its own. Raises MethodError for settings that do not exist."""
@@ -122,6 +123,7 @@ class Method:
                 replace(knob, default=variant.settings.get(knob.name, knob.default)) for knob in self.knobs
             ),
             variants=(),
+            own=tuple(variant.settings),
         )
 
     def settings(self, given: Mapping[str, Setting] | None = None) -> dict[str, Setting]:

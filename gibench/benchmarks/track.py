@@ -96,8 +96,9 @@ class Preset(_Strict):
     share. training, reference: keys of the recipe of either; references are rendered twice, and without `training`
     there is nothing to learn from. panoramas: of rooms, that light frames to train on too. training_rooms,
     training_seed: of a track that trains on rooms of their own. knobs: values for every method that has a knob of that
-    name, so that all share what is baked. methods: by id; a method that is not named runs at its defaults. variants:
-    whether those of methods run too where nobody says which methods do.
+    name, so that all share what is baked. methods: by id; a method that is not named runs at its defaults. A variant
+    has the base of its method, but for the knobs that make it one, and is run once. variants: whether those of methods
+    run too where nobody says which methods do.
     """
 
     rooms: int = Field(ge=1)
@@ -119,7 +120,11 @@ class Preset(_Strict):
         """Plan of this preset for a method."""
         plan = self.methods.get(method.id, MethodPlan())
         shared = {knob.name: self.knobs[knob.name] for knob in method.knobs if knob.name in self.knobs}
-        return MethodPlan(base={**shared, **plan.base}, vary=plan.vary)
+        whole, variant, _ = method.id.partition(":")
+        if variant and whole in self.methods:
+            shared |= self.methods[whole].base
+        inherited = {name: value for name, value in shared.items() if name not in method.own}
+        return MethodPlan(base={**inherited, **plan.base}, vary=plan.vary)
 
     def recipe(
         self,

@@ -5,8 +5,11 @@ from collections import Counter
 
 import pytest
 
+from gibench.baselines.method import Knob, Variant
 from gibench.benchmarks.errors import TrackError
 from gibench.benchmarks.orders import ordered_methods
+from gibench.benchmarks.registry import installed
+from gibench.benchmarks.settings import choices
 from gibench.benchmarks.track import CHANNELS_OF, MOVING, check_track, load_track, track_names
 from gibench.generators.rooms import sample_room
 from gibench.rendering.render import MAX_DEPTH
@@ -238,3 +241,37 @@ def test_a_method_that_trains_where_there_is_nothing_to_train_on():
         with pytest.raises(TrackError, match="trains, but walkthrough, preset tiny, has no views"):
             ordered_methods(track, "tiny", [method], {})
     assert ordered_methods(track, "tiny", [toys.PLAIN], {})
+
+
+def test_a_variant_runs_once_at_the_base_of_its_method():
+    knobs = tuple(
+        Knob(name, default, (1, 2, 3, 4), "a number")
+        for name, default in (("size", 1), ("rays", 1), ("parts", 1), ("shared", 1))
+    )
+    variants = (Variant("large", {"size": 4}), Variant("wide", {"size": 4, "shared": 4}))
+    method, large, wide = toys.card("Plain", knobs=knobs, variants=variants).with_variants()
+    tables = {"plain": {"base": {"size": 2, "parts": 2}, "vary": {"rays": [2, 3, 4]}}}
+    values = {"knobs": {"shared": 2}, "methods": tables}
+
+    def run(method):
+        preset = check_track(changed(lambda t, p: p.update(values))).preset("tiny")
+        return [tuple(choice.settings.values()) for choice in choices(method, preset.plan(method), {})]
+
+    assert run(method) == [(2, 2, 2, 2), (2, 3, 2, 2), (2, 4, 2, 2)]
+    # What is swept stays at its default.
+    assert run(large) == [(4, 1, 2, 2)]
+    assert run(wide) == [(4, 1, 2, 4)]
+    tables["plain:large"] = {"base": {"parts": 3}, "vary": {"shared": [3, 4]}}
+    assert run(large) == [(4, 1, 3, 3), (4, 1, 3, 4)]
+
+
+def test_presets_give_variants_what_their_methods_have():
+    cpu = load_track("moving-light").preset("cpu")
+    for id in ("rrf", "rrf:facing"):
+        (choice,) = choices(installed().get(id).method, cpu.plan(installed().get(id).method), {})
+        assert choice.settings["cells"] == 256
+        assert choice.label == id
+    paper = load_track("moving-light").preset("paper")
+    method = installed().get("ngi:no-cnn").method
+    (choice,) = choices(method, paper.plan(method), {})
+    assert (choice.settings["crop"], choice.settings["cnn"]) == (256, False)
