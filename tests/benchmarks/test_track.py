@@ -271,7 +271,3 @@ def test_presets_give_variants_what_their_methods_have():
         (choice,) = choices(installed().get(id).method, cpu.plan(installed().get(id).method), {})
         assert choice.settings["cells"] == 256
         assert choice.label == id
-    paper = load_track("moving-light").preset("paper")
-    method = installed().get("ngi:no-cnn").method
-    (choice,) = choices(method, paper.plan(method), {})
-    assert (choice.settings["crop"], choice.settings["cnn"]) == (256, False)

@@ -37,6 +37,10 @@ RATES = {"full": 1e-4, "small": 1e-3}
 """Of Adam at the start, by network; it falls along half a cosine. The paper has 1e-4, and makes a hundred times the
 steps of a CPU."""
 
+CROPS = {"full": 256, "small": 64}
+"""Pixels along a side of what a step learns from, by network, where no knob says. The U-Net of the full one has eight
+levels, and smaller images are padded to 256."""
+
 BATCH = 2
 """Crops a step; the paper has one image of 256 × 256."""
 
@@ -98,9 +102,8 @@ class TrainingPlan:
     def of(settings: Mapping[str, Setting], seed: int, seconds: float | None) -> TrainingPlan:
         """From the settings of the method."""
         name = str(settings["network"])
-        return TrainingPlan(
-            name, size_of(settings), bool(settings["lpips"]), int(settings["crop"]), seed, seconds
-        )
+        crop = int(settings["crop"]) or CROPS[name]
+        return TrainingPlan(name, size_of(settings), bool(settings["lpips"]), crop, seed, seconds)
 
 
 def size_of(settings: Mapping[str, Setting]) -> Size:

@@ -93,6 +93,16 @@ def test_every_variant_is_another_network_or_another_training(variant):
     assert code.shape == (1, 3, 32, 48)
 
 
+@pytest.mark.parametrize("name", ["small", "full"])
+def test_a_step_learns_from_crops_that_the_network_need_not_pad(name):
+    settings = METHOD.settings({"network": name})
+    size = size_of(settings)
+    crop = TrainingPlan.of(settings, seed=3, seconds=1.0).crop
+    assert crop % 2 ** len(size.levels) == 0
+    assert crop == {"small": 64, "full": 256}[name]
+    assert TrainingPlan.of({**settings, "crop": 32}, seed=3, seconds=1.0).crop == 32
+
+
 def test_a_frame_ten_times_larger_and_one_of_nothing():
     network = NeuralGlobalIllumination(SMALL).eval()
     with torch.inference_mode():
