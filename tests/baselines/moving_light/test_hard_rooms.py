@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 import torch
 
+from gibench.baselines.bilateral_network import METHOD as BILATERAL
+from gibench.baselines.bilateral_network.implementation import BilateralConvolutions
 from gibench.baselines.compositional_scene_representations import training as representing
 from gibench.baselines.linearly_transformed_cosines import METHOD as DIRECT
 from gibench.baselines.linearly_transformed_cosines.implementation import AnalyticLight
@@ -17,7 +19,9 @@ from gibench.baselines.neural_global_illumination import SURFACE
 from gibench.baselines.neural_global_illumination.inputs import assembled
 from gibench.baselines.radiance_regression import training as regressing
 from gibench.baselines.stages import Stages
+from gibench.baselines.training.artifacts import RECORD, WEIGHTS
 from gibench.baselines.training.budget import Budget
+from gibench.baselines.training.files import write_tensors
 from gibench.baselines.training.loop import train
 from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.channels import CUES
@@ -63,12 +67,26 @@ def of_direct(rig, folder):
     return running
 
 
+def of_bilateral(rig, folder):
+    """`bcn` that has learned nothing."""
+    settings = BILATERAL.settings({"width": 0.125, "spp": 4, "denoise": False})
+    torch.manual_seed(0)
+    network = BilateralConvolutions(settings).network()
+    kept = {"weights": {"network": network.state_dict()}, "facts": {"in_view": 0.1}}
+    write_tensors(folder / WEIGHTS, kept)
+    (folder / RECORD).write_text("{}")
+    running = BilateralConvolutions(settings)
+    running.prepare(dataclasses.replace(site(rig.scene, folder), weights=folder, rig=rig))
+    return running
+
+
 MADE = {
     "ltc-direct": of_direct,
     "lpv": lpv.prepared,
     "ngi": lambda rig, folder: ngi.prepared(rig, ngi.untrained(folder), folder),
     "rrf": lambda rig, folder: rrf.prepared(rig, rrf.untrained(folder), folder),
     "cnnr": cnnr.untrained,
+    "bcn": of_bilateral,
 }
 
 

@@ -38,12 +38,15 @@ SETTINGS = {
     "rrf": {"cells": 16, "rays": 1},
     "rrf:facing": {"cells": 16, "rays": 1, "facing": True},
     "cnnr": {"network": "small", "crop": 32, "observed": 4, "rays": 1},
+    "bcn": {"width": 0.125, "crop": 32, "batch": 4, "perceptual": False, "denoise": False, "spp": 4},
 }
-PACKAGES = {
-    "ngi": "neural_global_illumination",
-    "rrf": "radiance_regression",
-    "cnnr": "compositional_scene_representations",
+LENGTHS = {
+    "ngi": "neural_global_illumination.training.STEPS",
+    "rrf": "radiance_regression.training.STEPS",
+    "cnnr": "compositional_scene_representations.training.STEPS",
+    "bcn": "image_to_image.implementation.EPOCHS",
 }
+"""What says how long a training is; an epoch of `bcn` is one step here."""
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +72,7 @@ def prepared(name, room, rig, folder):
     bakes = BakeCache(folder / "bakes", "scene", {}, views)
     at = dataclasses.replace(site(rig.scene, folder), training=views, rig=rig, bakes=bakes, max_depth=3)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(f"gibench.baselines.{PACKAGES[name.partition(':')[0]]}.training.STEPS", STEPS)
+        patch.setattr(f"gibench.baselines.{LENGTHS[name.partition(':')[0]]}", STEPS)
         if method.trains:
             weights = folder / "weights"
             weights.mkdir()

@@ -14,17 +14,12 @@ from gibench.baselines.neural_free_viewpoint_relighting.training import Training
 from gibench.baselines.neural_precomputed_radiance_transfer.network import TransferNetwork
 from gibench.baselines.neural_precomputed_radiance_transfer.training import RadianceTransfer
 from gibench.baselines.relighting.surfaces import Box
-from gibench.baselines.training.budget import Budget
-from gibench.baselines.training.checkpoints import Checkpoint
-from gibench.baselines.training.loop import train
 from gibench.baselines.training.reproducible import seeded
 from gibench.baselines.vertex_features.field import VertexField
 from gibench.baselines.vertex_features.remeshing import even_mesh
 from tests.baselines.neural_free_viewpoint_relighting.made import FACES, Made
 from tests.baselines.neural_precomputed_radiance_transfer.test_training import Pictures
-
-STEPS, LAST = 8, 5
-"""Of a whole training, and of one that is cut off."""
+from tests.baselines.training.cut_off import repeats_also_where_it_was_cut_off
 
 UNIT = Box((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
 
@@ -68,31 +63,4 @@ def two_threads():
 
 @pytest.mark.parametrize("make", LEARNERS.values(), ids=LEARNERS)
 def test_it_repeats_to_the_bit_also_where_it_was_cut_off(make, tmp_path, two_threads):
-    budget = Budget(steps=STEPS, look_every=STEPS)
-
-    def checkpoint():
-        return Checkpoint(tmp_path / "state", {"of": "test"}, every=0)
-
-    begun = []
-
-    def learnt(last=STEPS, checkpoint=None):
-        learner = make()
-
-        def drawn(first):
-            begun.append(first)
-            for number, batch in enumerate(learner.batches()(first), first):
-                if number == last:
-                    raise KeyboardInterrupt
-                yield batch
-
-        return train(learner, drawn, budget, seed=3, checkpoint=checkpoint)
-
-    whole, again = learnt(), learnt()
-    with pytest.raises(KeyboardInterrupt):
-        learnt(LAST, checkpoint())
-    resumed = learnt(checkpoint=checkpoint())
-    assert begun == [0, 0, 0, LAST]
-    assert resumed.steps == whole.steps == STEPS
-    for name, tensor in whole.weights["network"].items():
-        assert torch.equal(tensor, again.weights["network"][name]), name
-        assert torch.equal(tensor, resumed.weights["network"][name]), name
+    repeats_also_where_it_was_cut_off(make, lambda learner: learner.batches(), tmp_path)
