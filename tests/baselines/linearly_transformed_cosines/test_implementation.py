@@ -92,12 +92,28 @@ FLOORS = {
 }
 
 
-def floor(material, normal=1, *, sheet=False):
+def parts_of_floor(material, normal=1, *, sheet=False):
     """A floor whose normal is up or down, under a sheet or not."""
     parts = {"floor": scenes.rectangle([0, 0, 0], [0, 0, normal], (1.5, 1.5), bsdf=FLOORS[material])}
     if sheet:
         parts["sheet"] = scenes.rectangle([0, 0, 0.4], [0, 0, 1], (0.3, 0.3), bsdf=FLOORS["diffuse"])
-    return LightRig(load_dict({"type": "scene", **parts}), panoramas=False)
+    return parts
+
+
+def floor(*given, **named):
+    return LightRig(load_dict({"type": "scene", **parts_of_floor(*given, **named)}), panoramas=False)
+
+
+def shining(lights):
+    """Rectangles of a scene that shine as lights do."""
+    black = scenes.two_sided(type="diffuse", reflectance=scenes.rgb(0))
+    return {
+        f"light{number}": {
+            **scenes.rectangle(one.centre, one.direction, (one.width / 2, one.height / 2), bsdf=black),
+            "emitter": {"type": "area", "radiance": scenes.rgb(*one.radiance)},
+        }
+        for number, one in enumerate(lights)
+    }
 
 
 def on_floor(rig, light):
@@ -135,6 +151,22 @@ def test_what_a_small_light_does_not_reach_is_dark(side, material):
     umbra = (truth < 1e-6 * truth.max()).all(axis=2)
     assert umbra.sum() > 20
     assert found[umbra].mean() < 0.01 * truth.mean()
+
+
+@pytest.mark.parametrize("material", ["diffuse", "coated"])
+def test_light_of_two_lights_is_the_sum_of_both(material):
+    lights = [
+        AreaLight((-0.7, 0.1, 1.8), (0, 0.1, -1), 0.6, 0.6, (5, 4, 3)),
+        AreaLight((0.8, 0.2, 1.2), (-0.5, 0, -1), 0.3, 0.5, (2, 6, 9)),
+    ]
+    rig = floor(material, sheet=True)
+    found = sum(part for light in lights for part in on_floor(rig, light)[:2])
+    both = load_dict({"type": "scene", **parts_of_floor(material, sheet=True), **shining(lights)})
+    names = ("direct_diffuse", "direct_specular")
+    truth = render_frame(both, ABOVE, resolution=RESOLUTION, channels=names, spp=256, max_depth=1).arrays
+    truth = sum(truth[name] for name in names)
+    np.testing.assert_allclose(found.mean(axis=(0, 1)), truth.mean(axis=(0, 1)), rtol=0.05)
+    assert np.abs(found - truth).mean() < 0.1 * truth.mean()
 
 
 def test_a_frame_is_what_is_emitted_and_direct_light(rig, method):
