@@ -25,7 +25,7 @@ normal (radians), reflected share of white light, and the part of it that is at 
 SIDE = 64
 
 SMALLEST_ALPHA = 1e-3
-"""GGX alpha of the first row. What is smoother is followed by a ray, as mirrors are."""
+"""GGX alpha of the first row. A rough lobe that is smoother has this one; perfect mirrors are followed by a ray."""
 
 SMALLEST_COSINE = 1e-3
 """Between view and normal, of the last column."""
