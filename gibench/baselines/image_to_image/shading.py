@@ -45,9 +45,14 @@ def remodulated(light: Tensor, albedo: Tensor) -> Tensor:
     return light * (albedo + DARKEST)
 
 
-def brightness(direct: Tensor) -> Tensor:
-    """(…, 1, 1, 1): mean of direct light over albedo (…, 3, H, W), all colours together."""
-    return direct.mean(dim=(-3, -2, -1), keepdim=True)
+def brightness(direct: Tensor, albedo: Tensor, *, of_each_colour: bool = False) -> Tensor:
+    """(…, 1, 1, 1), or (…, 3, 1, 1) of each colour: the light on what is in view, mean radiance over mean albedo.
+
+    Not the mean of radiance over albedo: radiance is the mean of a pixel and albedo that of its centre, so a black
+    thing has a bright rim, which would decide. direct, albedo: (…, 3, H, W).
+    """
+    over = (-2, -1) if of_each_colour else (-3, -2, -1)
+    return demodulated(direct.mean(dim=over, keepdim=True), albedo.mean(dim=over, keepdim=True))
 
 
 def in_units(light: Tensor, unit: Tensor) -> Tensor:
@@ -113,10 +118,10 @@ def indirect(
     """Indirect diffuse radiance (N, 3, H, W), finite and ≥ 0.
 
     network: of (light, geometry) as in `Inputs`, gives logarithms. direct: direct diffuse radiance (N, 3, H, W), ≥ 0.
-    geometry: (N, GEOMETRY, H, W). unit: of light over albedo, (N, 1 or 3, 1, 1), its mean by default.
+    geometry: (N, GEOMETRY, H, W). unit: of light over albedo, (N, 1 or 3, 1, 1), its brightness by default.
     """
     if unit is None:
-        unit = brightness(demodulated(direct, albedo))
+        unit = brightness(direct, albedo)
     inputs = Inputs.of(direct, albedo, geometry, unit)
     return inputs.radiance(network(inputs.light, inputs.geometry))
 

@@ -204,7 +204,7 @@ def test_demodulation_is_undone_and_black_surfaces_do_not_divide():
         light = demodulated(radiance, torch.full_like(radiance, albedo))
         assert torch.isfinite(light).all()
         torch.testing.assert_close(remodulated(light, torch.full_like(radiance, albedo)), radiance)
-    assert (brightness(torch.zeros(1, 3, 4, 4)) == 0).all()
+    assert (brightness(torch.zeros(1, 3, 4, 4), torch.zeros(1, 3, 4, 4)) == 0).all()
 
 
 def test_features_are_dropped_only_while_it_trains():

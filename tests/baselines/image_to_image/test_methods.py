@@ -168,9 +168,35 @@ def test_a_room_that_is_lit_a_hundred_thousand_times_brighter_is_the_same_room(n
     torch.testing.assert_close(indirect(net, 1e9 * dark, albedo, geometry), 1e9 * expected, rtol=1e-3, atol=0)
 
 
+@pytest.mark.parametrize("of_each_colour", [False, True])
+def test_a_black_edge_has_no_more_than_its_share_of_the_unit(of_each_colour):
+    direct, albedo, _ = frame(40, 40)
+    black, edge = albedo.clone(), direct.clone()
+    black[..., 10:30] = 0
+    edge[..., 11:29] = 0  # of the black part, pixels at the rim have light of what lies beside it
+
+    def unit(direct, albedo):
+        return brightness(direct, albedo, of_each_colour=of_each_colour)
+
+    # A tenth of the direct light lies on the rim.
+    inside = edge.clone()
+    inside[..., 10:30] = 0
+    ratio = unit(edge, black) / unit(inside, black)
+    torch.testing.assert_close(ratio, torch.full_like(ratio, 1.1), rtol=0.05, atol=0)
+    assert torch.equal(unit(8 * edge, black), 8 * unit(edge, black))
+    order = [2, 0, 1]
+    turned = unit(edge[:, order], black[:, order])
+    torch.testing.assert_close(turned, unit(edge, black)[:, order] if of_each_colour else unit(edge, black))
+    assert turned.shape == (1, 3 if of_each_colour else 1, 1, 1)
+    assert not unit(0 * edge, black).any()
+    # Where albedo is the same everywhere, it is the mean of light over albedo.
+    over = (-2, -1) if of_each_colour else (-3, -2, -1)
+    torch.testing.assert_close(unit(direct, albedo), demodulated(direct, albedo).mean(over, keepdim=True))
+
+
 def radiance(net, example):
     one = {name: image[None] for name, image in inputs_of(example).items()}
-    unit = brightness(demodulated(one["direct"], one["albedo"]))
+    unit = brightness(one["direct"], one["albedo"])
     inputs = Inputs.of(one["direct"], one["albedo"], one["geometry"], unit)
     return inputs.radiance(net(inputs.light, inputs.geometry))[0]
 

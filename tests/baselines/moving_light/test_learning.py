@@ -14,7 +14,7 @@ from gibench.baselines.image_to_image import implementation
 from gibench.baselines.image_to_image.examples import READ, Draw, Examples, inputs_of
 from gibench.baselines.image_to_image.frames import Frames
 from gibench.baselines.image_to_image.learner import IndirectLight, TrainingPlan
-from gibench.baselines.image_to_image.shading import brightness, demodulated, in_units, indirect
+from gibench.baselines.image_to_image.shading import brightness, in_units, indirect
 from gibench.baselines.image_to_image.units import Units
 from gibench.baselines.method import Training, View
 from gibench.baselines.stages import Stages
@@ -134,7 +134,8 @@ def test_light_of_image_networks_is_in_units_of_what_the_light_gives_off(room):
         given = units.in_view * area.area * torch.tensor(area.radiance)
         torch.testing.assert_close(example["unit"].flatten(), given)
     seen = [
-        in_units(demodulated(one["direct_diffuse"], one["albedo"]), one["unit"]).mean() for one, _ in read
+        in_units(brightness(one["direct_diffuse"], one["albedo"], of_each_colour=True), one["unit"]).mean()
+        for one, _ in read
     ]
     assert np.mean(seen) == pytest.approx(1, rel=1e-5)
     # How bright the room is is known: exposures are not drawn.
@@ -142,8 +143,7 @@ def test_light_of_image_networks_is_in_units_of_what_the_light_gives_off(room):
     assert torch.equal(drawn["unit"], examples[0]["unit"])
     # Nothing is known of it where a light gives nothing, or nothing of it was ever in view.
     direct, albedo = (read[0][0][name] for name in ("direct_diffuse", "albedo"))
-    light = demodulated(direct, albedo)
-    assert torch.equal(Units().of(direct, albedo, read[0][1]), brightness(light))
+    assert torch.equal(Units().of(direct, albedo, read[0][1]), brightness(direct, albedo))
     assert not units.of(direct, albedo, dataclasses.replace(read[0][1], radiance=(0, 0, 0))).any()
 
 
