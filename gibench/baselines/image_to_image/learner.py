@@ -39,7 +39,7 @@ its β₁.
 """
 
 LARGEST_GRADIENT = 1.0
-"""Norm that gradients of the network are cut down to."""
+"""Norm that gradients of the network are cut down to, of a step that weighs as much as one."""
 
 LOOKED_FROM, LOOKED_EVERY, LOOKED_SIDE = 0.8, 4, 64
 """Share of the training after which there are the perceptual and the adversarial loss, steps from one with them to the
@@ -144,7 +144,8 @@ class IndirectLight(Learner):
         content = smooth_absolute(made, true, bend=BEND)
         losses = {"content": content}
         loss = CONTENT * content
-        looked = now.progress >= LOOKED_FROM and now.number % LOOKED_EVERY == 0
+        any_look = self.features is not None or "judge" in self.networks
+        looked = any_look and now.progress >= LOOKED_FROM and now.number % LOOKED_EVERY == 0
         window = random_window(made.shape[-2:], LOOKED_SIDE, now.random) if looked else None
         if self.features is not None and window is not None:
             shown = _shown(batch, inputs.radiance_of(light))
@@ -159,7 +160,9 @@ class IndirectLight(Learner):
             ours, theirs = (window.of(image).flatten(0, 1)[:, None] for image in (made, true))
             losses["adversarial"] = fooling(discriminator(given, ours))
             loss = loss + LOOKED_EVERY * ADVERSARIAL * losses["adversarial"]
-        self.descend("network", loss, largest_gradient=LARGEST_GRADIENT)
+        # Cut down to the norm of other steps, a step with more weight would lose that weight again.
+        weight = 1 if window is None else LOOKED_EVERY
+        self.descend("network", loss, largest_gradient=weight * LARGEST_GRADIENT)
         if discriminator is not None and window is not None:
             losses["judge"] = judging(discriminator(given, theirs), discriminator(given, ours.detach()))
             self.descend("judge", losses["judge"])
