@@ -41,9 +41,9 @@ its β₁.
 LARGEST_GRADIENT = 1.0
 """Norm that gradients of the network are cut down to, of a step that weighs as much as one."""
 
-LOOKED_FROM, LOOKED_EVERY, LOOKED_SIDE = 0.8, 4, 64
+LOOKED_FROM, LOOKED_EVERY, LOOKED_SIDE = 0.5, 4, 64
 """Share of the training after which there are the perceptual and the adversarial loss, steps from one with them to the
-next, each with as much more weight, and pixels along a side of what they look at: they cost more than all else.
+next, each with as much more weight, and pixels along a side of what they look at: a look takes as long as a step.
 """
 
 EPOCHS = 80
