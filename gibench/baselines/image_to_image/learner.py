@@ -158,7 +158,10 @@ class IndirectLight(Learner):
             # A colour at a time, whatever the network does.
             given = window.of(inputs.light).transpose(1, 2).flatten(0, 1)
             ours, theirs = (window.of(image).flatten(0, 1)[:, None] for image in (made, true))
+            # What the discriminator learns comes from its own loss, below.
+            discriminator.requires_grad_(False)
             losses["adversarial"] = fooling(discriminator(given, ours))
+            discriminator.requires_grad_(True)
             loss = loss + LOOKED_EVERY * ADVERSARIAL * losses["adversarial"]
         # Cut down to the norm of other steps, a step with more weight would lose that weight again.
         weight = 1 if window is None else LOOKED_EVERY

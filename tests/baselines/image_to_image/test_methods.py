@@ -143,6 +143,30 @@ def test_a_step_of_each(views, name):
     assert learner.weights().keys() == {"network"}
 
 
+def test_fooling_the_discriminator_leaves_it_no_gradients(views, monkeypatch):
+    """And those of the network are what they are with them."""
+    frames = Examples(Frames(views, READ), Units())
+    found = []
+    for frozen in (True, False):
+        learner = IndirectLight(network("bcn"), frames, frames, TrainingPlan(32, 1, False, True, 0))
+        judge = learner.networks["judge"]
+        if not frozen:
+            monkeypatch.setattr(judge, "requires_grad_", lambda wanted: None)
+        left = []
+
+        def descended(name, loss, judge=judge, left=left, **_):
+            loss.backward()
+            left.append(any(one.grad is not None for one in judge.parameters()))
+
+        monkeypatch.setattr(learner, "descend", descended)
+        batch = next(iter(learner.batches()(0)))
+        learner.step(batch, Step(0, 0.5, np.random.default_rng(0)))
+        assert left == [not frozen, True]
+        found.append([one.grad for one in learner.network.parameters()])
+    for one, other in zip(*found, strict=True):
+        assert torch.equal(one, other)
+
+
 def frame(height=24, width=32, direct=1.0, albedo=0.5):
     generator = torch.Generator().manual_seed(0)
     light = direct * torch.rand(1, 3, height, width, generator=generator)

@@ -98,6 +98,26 @@ def test_features_are_those_of_vgg16_layer_by_layer():
 
 
 @with_weights
+def test_the_truth_has_no_gradient_and_the_output_the_one_that_it_has_beside_it():
+    loss = Vgg16Features()
+    output, truth = image(0).requires_grad_(True), image(1).requires_grad_(True)
+    found = loss(output, truth)
+    found.backward()
+    assert truth.grad is None
+    # Both through the layers at once.
+    other = image(0).requires_grad_(True)
+    features, total = loss.scaling(2 * torch.cat([other, image(1)]) - 1), torch.zeros(())
+    for number, layer in enumerate(loss.layers):
+        features = layer(features)
+        if number in loss.weights:
+            ours, theirs = features.chunk(2)
+            total = total + loss.weights[number] * (ours - theirs).abs().mean()
+    total.backward()
+    assert torch.equal(found, total)
+    assert torch.equal(output.grad, other.grad)
+
+
+@with_weights
 def test_no_more_layers_are_run_than_are_looked_at():
     network = build_network("vgg")
     assert len(network.net.slice1) == 4

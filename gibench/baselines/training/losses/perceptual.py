@@ -6,7 +6,7 @@ those of `gibench.metrics.lpips_weights`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import torch
 from torch import Tensor, nn
@@ -60,16 +60,22 @@ class Vgg16Features(nn.Module):
         self.weights = {RELU[name]: float(weight) for name, weight in weights.items()}
 
     def forward(self, output: Tensor, truth: Tensor) -> Tensor:
-        """The loss of a batch of (N, 3, H, W)."""
+        """The loss of a batch of (N, 3, H, W). The truth is given no gradient."""
         _check(output)
-        features = self.scaling(2 * torch.cat([output, truth]) - 1)
+        with torch.no_grad():
+            found = dict(self._features(truth))
         total = output.new_zeros(())
+        for number, features in self._features(output):
+            total = total + self.weights[number] * (features - found[number]).abs().mean()
+        return total
+
+    def _features(self, image: Tensor) -> Iterator[tuple[int, Tensor]]:
+        """Of each layer that is looked at, with its number."""
+        features = self.scaling(2 * image - 1)
         for number, layer in enumerate(self.layers):
             features = layer(features)
             if number in self.weights:
-                ours, theirs = features.chunk(2)
-                total = total + self.weights[number] * (ours - theirs).abs().mean()
-        return total
+                yield number, features
 
 
 def _check(image: Tensor) -> None:
