@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,8 +16,10 @@ from gibench.baselines.method import Setting
 from gibench.baselines.training.batches import batches
 from gibench.baselines.training.crops import random_window
 from gibench.baselines.training.display import displayed
+from gibench.baselines.training.errors import TrainingError
 from gibench.baselines.training.learner import Learner, Step
 from gibench.baselines.training.loop import Batches
+from gibench.baselines.training.losses import adversarial, perceptual
 from gibench.baselines.training.losses.adversarial import PatchGan, fooling, judging
 from gibench.baselines.training.losses.perceptual import Vgg16Features
 from gibench.baselines.training.losses.pixels import absolute, smooth_absolute
@@ -88,11 +90,16 @@ class IndirectLight(Learner):
         *,
         mixed: bool = False,
     ) -> None:
-        """network: on its device. mixed: whether it learns in `precision.mixed`."""
+        """network: on its device. mixed: whether it learns in `precision.mixed`.
+
+        Raises TrainingError for frames or crops that are too small for the losses of the plan.
+        """
         self.learned, self.plan, self.mixed = learned, plan, mixed
         # Read once, and before any clock says what a look takes.
         examples = [inputs_of(held_out[index]) for index in range(len(held_out))]
         self.held_out = [{name: image[None] for name, image in example.items()} for example in examples]
+        for example in examples:
+            _check(example["direct"].shape[-2:], plan)
         self.network = network
         device = next(network.parameters()).device
         networks = {"network": network}
@@ -170,6 +177,20 @@ class IndirectLight(Learner):
             losses["judge"] = judging(discriminator(given, theirs), discriminator(given, ours.detach()))
             self.descend("judge", losses["judge"])
         return {"loss": loss, **losses}
+
+
+def _check(size: Sequence[int], plan: TrainingPlan) -> None:
+    """size: height and width of frames. The late losses would refuse them when most of the training is over."""
+    side = min(*size, plan.crop, LOOKED_SIDE)
+    for loss, wanted, smallest in (
+        ("perceptual", plan.perceptual, perceptual.SMALLEST),
+        ("adversarial", plan.adversarial, adversarial.SMALLEST),
+    ):
+        if wanted and side < smallest:
+            raise TrainingError(
+                f"the {loss} loss looks at {smallest} pixels along each side at least, and training frames of "
+                f"{size[1]} × {size[0]} in crops of {plan.crop} have {side}: ask for more, or switch `{loss}` off"
+            )
 
 
 def _on(batch: Images, device: torch.device) -> Images:

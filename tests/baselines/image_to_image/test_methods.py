@@ -143,6 +143,43 @@ def test_a_step_of_each(views, name):
     assert learner.weights().keys() == {"network"}
 
 
+@pytest.mark.parametrize(
+    ("size", "crop", "losses", "message"),
+    [
+        (
+            (31, 48),
+            64,
+            (True, True),
+            "perceptual loss looks at 32 .* frames of 48 × 31 in crops of 64 have 31",
+        ),
+        (
+            (32, 40),
+            24,
+            (True, True),
+            "perceptual loss looks at 32 .* frames of 40 × 32 in crops of 24 have 24",
+        ),
+        ((32, 23), 64, (False, True), "adversarial loss looks at 24 .* have 23: .* switch `adversarial` off"),
+        ((32, 48), 32, (True, True), None),
+        ((24, 24), 24, (False, True), None),
+        ((8, 8), 24, (False, False), None),
+    ],
+)
+def test_frames_too_small_for_a_loss_end_a_training_before_it_begins(views, size, crop, losses, message):
+    frames = Examples(Frames(views, READ), Units())
+    height, width = size
+    small = [
+        {name: image.repeat(1, 1, 2)[:, :height, :width] for name, image in frames[0].items()}
+        for _ in range(2)
+    ]
+    plan = TrainingPlan(crop, 1, *losses, 0)
+    if message is None:
+        IndirectLight(network("bcn"), frames, small, plan)
+        return
+    with pytest.raises(TrainingError, match=message) as raised:
+        IndirectLight(network("bcn"), frames, small, plan)
+    assert "\n" not in str(raised.value)
+
+
 def test_fooling_the_discriminator_leaves_it_no_gradients(views, monkeypatch):
     """And those of the network are what they are with them."""
     frames = Examples(Frames(views, READ), Units())
