@@ -101,6 +101,8 @@ class IndirectByNetwork(DirectLight):
             made = indirect(self._network, direct[None], albedo[None], geometry(surfaces)[None], unit[None])[
                 0
             ]
+            # Albedo is 0 in the sky, and what is remodulated with it is not.
+            made = torch.where((surfaces["normal"] != 0).any(dim=0), made, 0)
             images = [image.movedim(0, -1).contiguous() for image in (full + made, made)]
         lit = float((direct > 0).any(dim=0).float().mean())
         extra = {"parameters": float(self.parameters), "lit": lit}

@@ -39,6 +39,7 @@ from gibench.baselines.training_set import training_set
 from gibench.benchmarks.registry import installed
 from gibench.datasets.loading import open_dataset
 from gibench.rendering.camera import PinholeCamera
+from gibench.rendering.lighting import AreaLight, Lighting, Shot
 from gibench.rendering.scene import load_dict, load_scene
 from tests.baselines.sites import site, view
 from tests.rendering import scenes
@@ -117,7 +118,9 @@ def test_a_training_and_a_frame(room, weights, tmp_path):
         assert image.shape == (24, 32, 3)
         assert np.isfinite(image).all()
     assert (found.color >= found.indirect).all()
-    assert (found.indirect > 0).all()
+    hit = (method._surfaces.read(dataset[0].camera, (32, 24))["normal"] != 0).any(dim=0).cpu().numpy()
+    assert hit.mean() > 0.8
+    assert (found.indirect[hit] > 0).all()
     assert found.extra["lit"] > 0.1
     (weights / artifacts.WEIGHTS).rename(tmp_path / "away")
     try:
@@ -421,6 +424,49 @@ def test_one_frame_is_too_few(room, tmp_path):
     lonely = type(only)(only._dataset[:1])
     with pytest.raises(TrainingError, match="there are 1: ask for more `views`"):
         made("bcn").train(Training(lonely, 1.0, 0, tmp_path, tmp_path / "checkpoint", Stages()))
+
+
+@pytest.fixture
+def untrained(monkeypatch):
+    """Prepares a method with the first weights of its network."""
+
+    def prepared(name, at, **facts):
+        method = made(name, denoise=False, spp=4)
+        torch.manual_seed(0)
+        weights = {"network": method.network().state_dict()}
+        monkeypatch.setattr(artifacts, "kept", lambda folder: (weights, facts))
+        method.prepare(dataclasses.replace(at, weights=at.folder))
+        return method
+
+    return prepared
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_sky_has_no_indirect_light(name, untrained, tmp_path):
+    """Nor has a frame that shows nothing else."""
+    grey = {"type": "diffuse", "reflectance": scenes.rgb(0.5)}
+    scene = load_dict(
+        {
+            "type": "scene",
+            "floor": scenes.rectangle([0, 0, 0], [0, 0, 1], (20, 20), bsdf=grey),
+            "lamp": scenes.rectangle([0, 0, 9], [0, 0, -1], (1, 1), bsdf=grey, emitter=scenes.area(20)),
+        }
+    )
+    # In units of a light, a network says something where no light is in view too.
+    method = untrained(name, site(scene, tmp_path), in_view=0.1)
+    lighting = Lighting(AreaLight((0, 0, 9), (0, 0, -1), 2, 2, (20, 20, 20)))
+    for target, hit in (((0, 6, 1.0), True), ((0, -12, 12), False)):
+        camera = PinholeCamera((0, -6, 1), target, 1.0)
+        shown = dataclasses.replace(view(camera), shot=Shot(camera, lighting))
+        found = method.render(shown, Stages())
+        missed = (method._surfaces.read(camera, (32, 24))["normal"] == 0).all(dim=0).cpu().numpy()
+        assert missed.any()
+        assert (~missed).any() == hit
+        assert not np.asarray(found.indirect)[missed].any()
+        if hit:
+            assert (np.asarray(found.indirect)[~missed] > 0).all()
+        else:
+            assert not np.asarray(found.color).any()
 
 
 def hall(color):
