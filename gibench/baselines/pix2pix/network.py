@@ -14,7 +14,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn.functional import dropout, leaky_relu, relu
 
-from gibench.baselines.training.padding import padded
+from gibench.baselines.training.padding import at_least
 
 CHANNELS = (64, 128, 256, 512, 512, 512, 512)
 """Of the levels below full resolution: 41.83 M parameters, as Gai, Wang & Li report."""
@@ -58,23 +58,26 @@ class UNet(nn.Module):
                 nn.init.zeros_(layer.bias)
 
     @property
-    def multiple(self) -> int:
-        """Pixels that a side must be a multiple of; others are padded."""
+    def smallest(self) -> int:
+        """Pixels that a side must have; shorter ones are padded."""
         return int(2 ** len(self.down))
 
     def forward(self, image: Tensor) -> Tensor:
         """(N, inputs, H, W) of any size to (N, outputs, H, W)."""
         height, width = image.shape[-2:]
-        features = padded(image, self.multiple)
+        features = at_least(image, self.smallest)
         skips: list[Tensor] = []
+        sizes: list[list[int]] = []
         for level, down in enumerate(self.down):
+            sizes.append(list(features.shape[-2:]))
             features = down(leaky_relu(features, SLOPE) if level else features)
             if 0 < level < len(self.down) - 1:
                 features = self.down_norms[level - 1](features)
             skips.append(features)
         features = skips.pop()
         for level, up in enumerate(self.up):
-            features = up(relu(features))
+            # Of two sizes with the same half it is the one that was halved.
+            features = up(relu(features), output_size=sizes.pop())
             if skips:
                 features = self.up_norms[level](features)
                 if level < self.dropped:
