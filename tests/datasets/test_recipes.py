@@ -11,7 +11,7 @@ from gibench.rendering.channels import resolve
 
 def test_presets_are_those_that_the_readme_names():
     assert preset_names() == ("paper", "small", "smoke", "unseen")
-    smoke, small, paper = (load_preset(name) for name in ("smoke", "small", "paper"))
+    smoke, small, paper, unseen = (load_preset(name) for name in ("smoke", "small", "paper", "unseen"))
     assert (smoke.rooms, smoke.views, smoke.resolution, smoke.spp, smoke.denoise) == (
         2,
         2,
@@ -21,6 +21,8 @@ def test_presets_are_those_that_the_readme_names():
     )
     assert (small.views, small.resolution, small.spp, small.denoise) == (4, (256, 192), 64, True)
     assert (paper.views, paper.resolution, paper.spp) == (20, (768, 512), 1024)
+    # 30,000 frames of Gai et al.
+    assert (unseen.rooms, unseen.views, unseen.resolution, unseen.spp) == (1500, 20, (768, 512), 1024)
 
 
 def test_defaults_are_the_preset_small():
