@@ -498,7 +498,8 @@ def test_a_wall_far_away_colours_what_lies_beyond_the_reach_of_convolutions(weig
 
     def colour_of(prediction):
         red, green, _ = np.moveaxis(prediction.indirect[here], -1, 0)
-        return np.abs(green / red - 1).max()
+        hit = red > 0
+        return np.abs(green[hit] / red[hit] - 1).max()
 
     found = method.render(shown, Stages())
     seen = method._surfaces.read(camera, shown.resolution)["albedo"]
