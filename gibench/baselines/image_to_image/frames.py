@@ -38,7 +38,8 @@ class Frames:
         """Read one. Raises TrainingError for numbers that are not finite: with the file, the channel and the pixel."""
         images = self._items[index]
         for channel, image in images.items():
-            if not torch.isfinite(image).all():
+            # A sum is finite only of finite numbers, and found in a fraction of the time.
+            if not image.sum().isfinite() and not torch.isfinite(image).all():
                 place = (~torch.isfinite(image)).nonzero()[0].tolist()
                 raise TrainingError(
                     f"training frame {self.rows.iloc[index]['file']} holds {image[tuple(place)].item()} in {channel}, "

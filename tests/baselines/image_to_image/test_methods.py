@@ -9,7 +9,8 @@ import pytest
 import torch
 
 from gibench.baselines.image_to_image import implementation
-from gibench.baselines.image_to_image.examples import READ, Draw, Examples, inputs_of
+from gibench.baselines.image_to_image.camera_space import in_camera_space, mirrored
+from gibench.baselines.image_to_image.examples import READ, STOPS, Draw, Examples, inputs_of
 from gibench.baselines.image_to_image.frames import Frames
 from gibench.baselines.image_to_image.learner import (
     LARGEST_GRADIENT,
@@ -27,11 +28,13 @@ from gibench.baselines.image_to_image.shading import (
     geometry,
     in_units,
     indirect,
+    median_depth,
 )
 from gibench.baselines.image_to_image.units import Units
 from gibench.baselines.method import MethodError, Training
 from gibench.baselines.stages import Stages
 from gibench.baselines.training import artifacts
+from gibench.baselines.training.crops import random_window
 from gibench.baselines.training.errors import TrainingError
 from gibench.baselines.training.learner import Step
 from gibench.baselines.training.schedule import half_cosine
@@ -173,10 +176,9 @@ def test_a_step_of_each(views, name):
 def test_frames_too_small_for_a_loss_end_a_training_before_it_begins(views, size, crop, losses, message):
     frames = Examples(Frames(views, READ), Units())
     height, width = size
-    small = [
-        {name: image.repeat(1, 1, 2)[:, :height, :width] for name, image in frames[0].items()}
-        for _ in range(2)
-    ]
+    one = frames[0]
+    images = {name: image.repeat(1, 1, 2)[:, :height, :width] for name, image in one.images.items()}
+    small = [dataclasses.replace(one, images=images)] * 2
     plan = TrainingPlan(crop, 1, *losses, 0)
     if message is None:
         IndirectLight(network("bcn"), frames, small, plan)
@@ -284,11 +286,16 @@ def test_from_the_file_to_radiance_colours_and_exposure_are_what_they_are(views,
     expected = radiance(net, example)
     assert expected.std() > 0
     colours = ("direct_diffuse", "albedo", "indirect_diffuse")
-    turned = {name: image[[2, 0, 1]] if name in colours else image for name, image in example.items()}
+
+    def but(**images):
+        return dataclasses.replace(example, images={**example.images, **images})
+
+    turned = but(**{name: example.images[name][[2, 0, 1]] for name in colours})
+    direct = example.images["direct_diffuse"]
     torch.testing.assert_close(radiance(net, turned), expected[[2, 0, 1]], rtol=1e-4, atol=0)
-    brighter = {**example, "direct_diffuse": 8 * example["direct_diffuse"]}
+    brighter = but(direct_diffuse=8 * direct)
     assert torch.equal(radiance(net, brighter), 8 * expected)
-    brighter = {**example, "direct_diffuse": 0.3 * example["direct_diffuse"]}
+    brighter = but(direct_diffuse=0.3 * direct)
     torch.testing.assert_close(radiance(net, brighter), 0.3 * expected, rtol=1e-4, atol=0)
     # All colours together, it is another network for every order of them.
     together = network("gfa:normal")
@@ -378,6 +385,42 @@ def test_what_a_step_sees(views):
         sign = 1 if same else -1
         x = one["geometry"][0] if same else one["geometry"][0].flip(-1)
         torch.testing.assert_close(x, sign * whole["geometry"][0])
+
+
+def test_what_a_step_sees_is_cut_from_the_whole_frame_to_the_last_bit(views):
+    """Turned, mirrored and measured as a whole, a frame has the same pixels."""
+    example = Examples(Frames(views, READ), Units())[0]
+    images = in_camera_space(example.images, example.camera)
+    seen = set()
+    for seed in range(16):
+        found = Draw(20)(example, np.random.default_rng(seed))
+        random = np.random.default_rng(seed)
+        mirror = random.random() < 0.5
+        whole = mirrored(images) if mirror else images
+        exposed = 2.0 ** random.uniform(-STOPS, STOPS)
+        window = random_window((32, 40), 20, random)
+        for name, image in (
+            ("direct", whole["direct_diffuse"]),
+            ("truth", whole["indirect_diffuse"]),
+            ("albedo", whole["albedo"]),
+            ("geometry", geometry(whole)),
+        ):
+            assert torch.equal(found[name], window.of(image)), name
+            assert found[name].is_contiguous()
+        assert torch.equal(found["unit"], example.unit * exposed)
+        seen.add(mirror)
+    assert seen == {True, False}
+
+
+@pytest.mark.parametrize("hits", [0, 1, 2, 3, 8, 60])
+def test_the_median_depth_is_the_lower_one_of_what_is_hit(hits):
+    depth = torch.rand(2, 1, 6, 10, generator=torch.Generator().manual_seed(0)) + 0.1
+    depth.flatten(1)[:, hits:] = 0
+    found = median_depth(depth)
+    assert found.shape == (2, 1, 1, 1)
+    for one, median in zip(depth, found, strict=True):
+        expected = one[one > 0].median() if hits else torch.tensor(1.0)
+        assert torch.equal(median.flatten()[0], expected)
 
 
 def test_ground_far_away_leaves_the_room_its_size():

@@ -132,17 +132,19 @@ def test_light_of_image_networks_is_in_units_of_what_the_light_gives_off(room):
     read = [(examples[k], frames.area_light(k)) for k in range(len(examples))]
     for example, area in read:
         given = units.in_view * area.area * torch.tensor(area.radiance)
-        torch.testing.assert_close(example["unit"].flatten(), given)
+        torch.testing.assert_close(example.unit.flatten(), given)
     seen = [
-        in_units(brightness(one["direct_diffuse"], one["albedo"], of_each_colour=True), one["unit"]).mean()
+        in_units(
+            brightness(one.images["direct_diffuse"], one.images["albedo"], of_each_colour=True), one.unit
+        ).mean()
         for one, _ in read
     ]
     assert np.mean(seen) == pytest.approx(1, rel=1e-5)
     # How bright the room is is known: exposures are not drawn.
     drawn = Draw(16, 0.0)(examples[0], np.random.default_rng(0))
-    assert torch.equal(drawn["unit"], examples[0]["unit"])
+    assert torch.equal(drawn["unit"], examples[0].unit)
     # Nothing is known of it where a light gives nothing, or nothing of it was ever in view.
-    direct, albedo = (read[0][0][name] for name in ("direct_diffuse", "albedo"))
+    direct, albedo = (read[0][0].images[name] for name in ("direct_diffuse", "albedo"))
     assert torch.equal(Units().of(direct, albedo, read[0][1]), brightness(direct, albedo))
     assert not units.of(direct, albedo, dataclasses.replace(read[0][1], radiance=(0, 0, 0))).any()
 
