@@ -515,6 +515,58 @@ def test_the_sky_has_no_indirect_light(name, untrained, tmp_path):
             assert not np.asarray(found.color).any()
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_a_dark_room_next_to_a_lit_one_has_no_indirect_light(name, untrained, tmp_path):
+    """No direct light is in view, which is reported, and what cannot be known is black."""
+    grey = {"type": "diffuse", "reflectance": scenes.rgb(0.5)}
+    walls = {
+        "floor": ([0, 0, 0], [0, 0, 1], (4, 2)),
+        "ceiling": ([0, 0, 2.5], [0, 0, -1], (4, 2)),
+        "end": ([-4, 0, 1.25], [1, 0, 0], (2, 1.25)),
+        "other end": ([4, 0, 1.25], [-1, 0, 0], (2, 1.25)),
+        "side": ([0, -2, 1.25], [0, 1, 0], (4, 1.25)),
+        "other side": ([0, 2, 1.25], [0, -1, 0], (4, 1.25)),
+        "between": ([0, 0.5, 1.25], [1, 0, 0], (1.5, 1.25)),  # leaves a door of 1 m
+    }
+    scene = load_dict(
+        {
+            "type": "scene",
+            **{key: scenes.rectangle(*where, bsdf=scenes.two_sided(**grey)) for key, where in walls.items()},
+            "lamp": scenes.rectangle(
+                [-3, 1.5, 2.4], [0, 0, -1], (0.3, 0.3), bsdf=grey, emitter=scenes.area(20)
+            ),
+        }
+    )
+    method = untrained(name, site(scene, tmp_path))
+    found = method.render(view(PinholeCamera((3.5, 0, 1.2), (0.5, 2, 1.2), 0.9)), Stages())
+    assert found.extra["lit"] == 0
+    assert not np.asarray(found.indirect).any()
+    assert np.isfinite(found.color).all()
+    # From the lit room there is some.
+    found = method.render(view(PinholeCamera((-0.5, 0, 1.2), (-3, 0.5, 1.2), 0.9)), Stages())
+    assert found.extra["lit"] > 0.5
+    assert (np.asarray(found.indirect) > 0).all()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_room_of_mirrors_and_metal_stays_finite(name, untrained, tmp_path):
+    """Neither has diffuse light, so there is none of it to be predicted."""
+    scene = scenes.box("mirror")
+    for wall in ("ceiling", "back", "left"):
+        scene[wall] = {**scene[wall], "bsdf": {"type": "ref", "id": "subject"}}
+    scene["rough"] = {**scenes.MATERIALS["metal"], "id": "rough"}
+    scene["right"] = {**scene["right"], "bsdf": {"type": "ref", "id": "rough"}}
+    method = untrained(name, site(load_dict(scene), tmp_path))
+    shown = view(scenes.CAMERA)
+    found = method.render(shown, Stages())
+    color, indirect = np.asarray(found.color), np.asarray(found.indirect)
+    assert np.isfinite(color).all()
+    assert np.isfinite(indirect).all()
+    assert color.any()
+    assert (indirect >= 0).all()
+    assert found.extra["lit"] < 0.1
+
+
 def hall(color):
     """A hall of 24 m: its left wall has a colour and is lit by a lamp that faces it, all else is grey."""
     grey = {"type": "diffuse", "reflectance": scenes.rgb(0.5)}
