@@ -3,8 +3,8 @@
 A pixel is a sum of contributions: by depth, by lobe, by light, by the technique that found them. Along each of these
 its variance is the sum of the variances of the terms and of their covariances. Both are estimated without bias from
 the same groups of samples as `color_se` (see `estimate`), so that the rows add up to the variance of the frame,
-stratification included. One of LANES paths at most is the frame that `render_frame` gives for the seed; a larger one is
-traced in smaller blocks than there, which have seeds of their own.
+stratification included. A frame of one block is the one that `render_frame` gives for the seed; a larger one is traced
+in smaller blocks than there, which have seeds of their own.
 """
 
 from __future__ import annotations
