@@ -229,6 +229,10 @@ class View:
         return self.shot.camera
 
 
+PARTS = ("diffuse", "specular", "indirect")
+"""Of an image, besides all of it: those of a `Prediction` that a method may tell apart."""
+
+
 class Prediction:
     """The images that a method gives for a frame: arrays (H, W, 3), finite, ≥ 0, in the units of the channels.
 
@@ -243,16 +247,17 @@ class Prediction:
         specular: Any = None,
         extra: Mapping[str, float] | Callable[[], Mapping[str, float]] | None = None,
         *,
+        diffuse: Any = None,
         indirect: Any = None,
     ) -> None:
-        """color: all of the light. specular: what the first hit reflects by its specular lobe, direct and indirect.
+        """color: all of the light. specular, diffuse: what the first hit reflects by that lobe, direct and indirect.
 
         indirect: what comes to the first hit from other surfaces, by both lobes. None where the method cannot tell a
         part apart. A part that no frame shows, but that is scored, may be a function that works it out: it is called
         once the clock has stopped, as images are copied. extra: numbers worth a column, such as the samples that were
         spent, or a function for them likewise.
         """
-        self._images = {"color": color, "specular": specular, "indirect": indirect}
+        self._images = {"color": color, "diffuse": diffuse, "specular": specular, "indirect": indirect}
         self._extra = extra or {}
 
     def finish(self) -> None:
@@ -268,6 +273,11 @@ class Prediction:
     def color(self) -> NDArray[Any]:
         """All of the light, on the host."""
         return on_host(self._images["color"])
+
+    @cached_property
+    def diffuse(self) -> NDArray[Any] | None:
+        """The diffuse part, on the host."""
+        return on_host(self._images["diffuse"])
 
     @cached_property
     def specular(self) -> NDArray[Any] | None:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gibench import gate
-from gibench.baselines.method import MethodError, Prediction
+from gibench.baselines.method import PARTS, MethodError, Prediction
 from gibench.benchmarks.errors import ResultsError
 from gibench.datasets.exr import dark_radiance, fits_half
 from gibench.datasets.exr_header import read_header
@@ -21,7 +21,7 @@ Image = NDArray[np.float32]
 
 LAYERS = {
     "full": ("R", "G", "B"),
-    **{part: tuple(f"{part}.{component}" for component in "RGB") for part in ("specular", "indirect")},
+    **{part: tuple(f"{part}.{component}" for component in "RGB") for part in PARTS},
 }
 
 
@@ -30,14 +30,14 @@ class BadPrediction(MethodError):
 
 
 def checked(prediction: Prediction, resolution: tuple[int, int]) -> dict[str, Image]:
-    """The parts of a prediction, (H, W, 3) float32: "full", and of "specular" and "indirect" those that there are.
+    """The parts of a prediction, (H, W, 3) float32: "full", and those of PARTS that there are.
 
     resolution: (width, height) that was asked for. Raises BadPrediction, which says where.
     """
     if not isinstance(prediction, Prediction):
         raise BadPrediction(f"render returned {type(prediction).__name__}, not a Prediction")
     parts = {"full": _checked("color", prediction.color, resolution)}
-    for part in ("specular", "indirect"):
+    for part in PARTS:
         if (image := getattr(prediction, part)) is not None:
             parts[part] = _checked(part, image, resolution)
     return parts

@@ -19,12 +19,13 @@ from gibench.metrics import METRICS
 from gibench.rendering.channels import SAMPLED
 
 Names = Annotated[tuple[str, ...], Field(strict=False)]
-Part = Literal["full", "specular", "indirect"]
+Part = Literal["full", "diffuse", "specular", "indirect"]
 Value = int | float | str | bool
 
 #: Channels of a frame whose sum a part of the image is.
 CHANNELS_OF: dict[str, tuple[str, ...]] = {
     "full": ("color",),
+    "diffuse": ("direct_diffuse", "indirect_diffuse"),
     "specular": ("direct_specular", "indirect_specular"),
     "indirect": ("indirect_diffuse", "indirect_specular"),
 }

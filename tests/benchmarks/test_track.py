@@ -70,7 +70,7 @@ def test_training_views_and_references_are_of_the_same_rooms_and_no_frame_is_bot
     [
         (lambda t, p: t.update(presetz={}), "track: presetz: Extra inputs"),
         (lambda t, p: t.update(metrics=["rmsee"]), r"metrics: no metric 'rmsee'; did you mean 'rmse'"),
-        (lambda t, p: t.update(parts=["full", "diffuse"]), r"parts\.1"),
+        (lambda t, p: t.update(parts=["full", "gloss"]), r"parts\.1"),
         (lambda t, p: p.update(rooms=0), r"presets\.tiny\.rooms"),
         (lambda t, p: p["budget"].update(render=-1), r"presets\.tiny\.budget\.render"),
         (lambda t, p: p["budget"].update(render=math.nan), r"presets\.tiny\.budget\.render"),
@@ -125,7 +125,9 @@ def test_the_presets_of_the_tracks_with_other_light_and_other_rooms():
     assert sizes("unseen-rooms") == ([200, 4], [3 + 16] * 4 + [3] * 20, (192, 128))
     for name in ("moving-light", "relight", "unseen-rooms"):
         track = load_track(name)
-        assert track.parts == ("full", "indirect")
+        # The networks for unseen rooms predict one lobe, as their paper does.
+        lobes = ("diffuse", "specular") if name == "unseen-rooms" else ()
+        assert track.parts == ("full", "indirect", *lobes)
         assert {"mae", "mse", "psnr", "ssim", "lpips_alex"} <= set(track.metrics)
         assert "warping_error" in track.sequence_metrics
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gibench.baselines.direct_light.tracer import DirectLight
 from gibench.baselines.environments import mean_radiance
-from gibench.baselines.method import MethodError, Prediction, Site, Training, View, reading
+from gibench.baselines.method import MethodError, Prediction, Site, Training, View, on_host, reading
 from gibench.baselines.stages import Stages
 from gibench.rendering.lighting import Lighting
 
@@ -39,8 +39,9 @@ class AmbientLight(DirectLight):
 
     @staticmethod
     def parts_of(site: Site) -> list[str]:
-        """Direct light as it is shown: indirect light is not traced."""
-        return ["full"]
+        """Direct light as it is shown, and by lobes where they are scored: indirect light is not traced."""
+        lobes = {"diffuse": "direct_diffuse", "specular": "specular"}
+        return ["full", *(traced for part, traced in lobes.items() if part in site.parts)]
 
     def train(self, training: Training) -> None:
         """Fit the constant."""
@@ -67,10 +68,20 @@ class AmbientLight(DirectLight):
 
     def render(self, view: View, stages: Stages) -> Prediction:
         """Direct light, and the constant times albedo."""
-        parts, albedo = self.images(view, stages)
+        parts = self.images(view, stages, ("full",))
+        albedo = parts["albedo"]
         constant = self._constant * light_of(view.shot.lighting)
         ambient = albedo * type(albedo)(constant.astype(np.float32))
-        return Prediction(parts["full"] + ambient, indirect=ambient)
+
+        def diffuse() -> NDArray[Any]:
+            return np.asarray(on_host(parts["direct_diffuse"]) + on_host(ambient))
+
+        return Prediction(
+            parts["full"] + ambient,
+            parts.get("specular"),
+            diffuse=diffuse if "direct_diffuse" in parts else None,
+            indirect=ambient,
+        )
 
 
 def light_of(lighting: Lighting) -> NDArray[np.float64]:

@@ -46,8 +46,8 @@ class IndirectByNetwork(DirectLight):
 
     @staticmethod
     def parts_of(site: Site) -> list[str]:
-        """Direct light as it is shown, and as networks are given it."""
-        return ["full", "direct_diffuse"]
+        """Direct light as it is shown, as networks are given it, and what is scored beside."""
+        return ["full", "direct_diffuse", *(["specular"] if "specular" in site.parts else [])]
 
     def train(self, training: Training) -> float:
         """Learn indirect light from the rooms that are not held out."""
@@ -87,16 +87,19 @@ class IndirectByNetwork(DirectLight):
             self._units = Units(float(facts["in_view"]) if "in_view" in facts else None)
         self.parameters = sum(one.numel() for one in network.parameters())
         self._network = network.eval().requires_grad_(False).to(torch_device())
-        self._surfaces = DeviceFrames(site.scene, [name for name in CHANNELS if name != "direct_diffuse"])
+        self._surfaces = DeviceFrames(
+            site.scene, [name for name in CHANNELS if name not in ("direct_diffuse", "albedo")]
+        )
 
     def render(self, view: View, stages: Stages) -> Prediction:
         """Direct light, and what the network says to it. `lit`: share of the pixels that direct light falls on."""
-        parts, _ = self.images(view, stages)
+        parts = self.images(view, stages, ("full", "direct_diffuse"))
         with stages.stage("g-buffer"):
             surfaces = in_camera_space(self._surfaces.read(view.camera, view.resolution), view.camera)
         with stages.stage("inference"), torch.inference_mode():
-            full, direct = (channels_first(parts[name]) for name in ("full", "direct_diffuse"))
-            albedo = surfaces["albedo"]
+            full, direct, albedo = (
+                channels_first(parts[name]) for name in ("full", "direct_diffuse", "albedo")
+            )
             unit = self._units.of(direct, albedo, view.shot.lighting.area)
             made = indirect(self._network, direct[None], albedo[None], geometry(surfaces)[None], unit[None])[
                 0
@@ -104,6 +107,10 @@ class IndirectByNetwork(DirectLight):
             # Albedo is 0 in the sky, and what is remodulated with it is not.
             made = torch.where((surfaces["normal"] != 0).any(dim=0), made, 0)
             images = [image.movedim(0, -1).contiguous() for image in (full + made, made)]
+
+        def diffuse() -> torch.Tensor:
+            return (direct + made).movedim(0, -1)
+
         lit = float((direct > 0).any(dim=0).float().mean())
         extra = {"parameters": float(self.parameters), "lit": lit}
-        return Prediction(images[0], indirect=images[1], extra=extra)
+        return Prediction(images[0], parts.get("specular"), extra, diffuse=diffuse, indirect=images[1])

@@ -8,7 +8,7 @@ Image Denoise with albedo and normal as guides.
 # mypy: disable-error-code="no-untyped-def, misc"
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any, ClassVar
 
@@ -17,7 +17,7 @@ import mitsuba as mi
 import numpy as np
 
 from gibench.baselines.first_hits import averaged
-from gibench.baselines.method import Prediction, Setting, Site, View
+from gibench.baselines.method import PARTS, Prediction, Setting, Site, View
 from gibench.baselines.stages import Stages
 from gibench.rendering.denoise import denoise
 from gibench.rendering.integrator import trace_paths
@@ -54,10 +54,12 @@ def trace_rows(
         portals=scene.portals,
         layers=scene.layers,
     )
-    indirect = path.indirect_diffuse + path.indirect_specular
+    diffuse = path.direct_diffuse + path.indirect_diffuse
     specular = path.direct_specular + path.indirect_specular
-    lit = path.emission + path.direct_diffuse + path.indirect_diffuse + specular
-    images = {"full": lit, "specular": specular, "indirect": indirect, "direct_diffuse": path.direct_diffuse}
+    indirect = path.indirect_diffuse + path.indirect_specular
+    lit = path.emission + diffuse + specular
+    images = {"full": lit, "diffuse": diffuse, "specular": specular, "indirect": indirect}
+    images["direct_diffuse"] = path.direct_diffuse
     values: dict[str, Any] = {name: image for name, image in images.items() if name in ("full", *parts)}
     values |= {"albedo": path.albedo, "normal": path.normal}
     # A path that overflows counts as black. Shares are summed, so that huge radiance does not overflow on the way.
@@ -94,29 +96,28 @@ class PathTracer:
     @staticmethod
     def parts_of(site: Site) -> list[str]:
         """Names of the images that are traced, "full" first."""
-        return [part for part in ("full", "specular", "indirect") if part in ("full", *site.parts)]
+        return ["full", *(part for part in PARTS if part in site.parts)]
 
     def render(self, view: View, stages: Stages) -> Prediction:
-        """Trace, then denoise the image as a whole, as a renderer shows it. Parts that are scored are denoised once
-        more, outside of the clock, for no frame shows them.
+        """Trace, then denoise the image as a whole, as a renderer shows it.
 
         The sum of lobes denoised apart is worse below 8 paths a pixel: what one lacks is what the other has noise in.
         """
-        parts = self.traced(view, stages)
-        if self._denoise:
-            with stages.stage("denoising"):
-                full = denoised(parts, "full")
-            parts = {part: partial(denoised, parts, part) for part in self._parts} | {"full": full}
-        return Prediction(parts["full"], parts.get("specular"), indirect=parts.get("indirect"))
+        parts = self.images(view, stages, ("full",))
+        return Prediction(parts["full"], **{part: parts[part] for part in PARTS if part in parts})
 
-    def images(self, view: View, stages: Stages) -> tuple[dict[str, Any], Any]:
-        """Parts of a frame, denoised where that is set, and its albedo: (H, W, 3)."""
+    def images(self, view: View, stages: Stages, shown: Sequence[str]) -> dict[str, Any]:
+        """Parts of a frame, denoised where that is set, and GUIDES as they were sampled: (H, W, 3).
+
+        shown: parts that the frame is made of. Others, which are scored alone, are functions of no arguments where they
+        are denoised, to be called outside of the clock.
+        """
         parts = self.traced(view, stages)
-        albedo = parts["albedo"]
-        if self._denoise:
-            with stages.stage("denoising"):
-                parts = {part: denoised(parts, part) for part in self._parts}
-        return parts, albedo
+        if not self._denoise:
+            return parts
+        scored = {part: partial(denoised, parts, part) for part in self._parts if part not in shown}
+        with stages.stage("denoising"):
+            return parts | scored | {part: denoised(parts, part) for part in shown}
 
     def traced(self, view: View, stages: Stages) -> dict[str, Any]:
         """Parts of a frame and GUIDES as they were sampled, (H, W, 3)."""

@@ -17,7 +17,12 @@ if TYPE_CHECKING:
 PREPARATION = ("lightmap", "probes", "references", "training")
 """Kinds of preparation; the columns are prepare_<name>_s."""
 
-PARTS = {"full": "Full image", "indirect": "Indirect light", "specular": "Specular part"}
+PARTS = {
+    "full": "Full image",
+    "indirect": "Indirect light",
+    "diffuse": "Diffuse part",
+    "specular": "Specular part",
+}
 """Scored parts of an image, with their names for readers."""
 
 

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 
+import mitsuba as mi
 import numpy as np
 import pytest
 import torch
 
+from gibench.baselines.ambient_light import implementation as ambient
 from gibench.baselines.image_to_image import implementation
 from gibench.baselines.image_to_image.camera_space import in_camera_space, mirrored
+from gibench.baselines.image_to_image.device_frames import DeviceFrames
 from gibench.baselines.image_to_image.examples import READ, STOPS, Draw, Examples, inputs_of
 from gibench.baselines.image_to_image.frames import Frames
 from gibench.baselines.image_to_image.learner import (
@@ -567,6 +570,58 @@ def test_a_room_of_mirrors_and_metal_stays_finite(name, untrained, tmp_path):
     assert found.extra["lit"] < 0.1
 
 
+class Even(torch.nn.Module):
+    """Says that indirect light is one, in its unit, everywhere."""
+
+    def forward(self, light, geometry):
+        return torch.zeros_like(light[:, 0])
+
+
+def test_textures_finer_than_pixels_are_as_smooth_as_they_are_seen(untrained, tmp_path):
+    """Light is parted from the albedo that its own samples met: that of pixel centres is black or white here."""
+    squares = {"type": "checkerboard", "color0": scenes.rgb(0.1), "color1": scenes.rgb(0.9)}
+    squares["to_uv"] = mi.ScalarTransform4f().scale(900)
+    floor = {"type": "diffuse", "reflectance": squares}
+    scene = load_dict(
+        {
+            "type": "scene",
+            "floor": scenes.rectangle([0, 0, 0], [0, 0, 1], (2, 2), bsdf=floor),
+            "sky": {"type": "constant", "radiance": scenes.rgb(1.0)},
+        }
+    )
+    method = untrained("bcn", site(scene, tmp_path))
+    method.adjust({**method.settings, "spp": 64})
+    method._network = Even()
+    camera = PinholeCamera((0, -0.5, 1), (0, 0, 0), 0.6)
+    found = method.render(view(camera), Stages())
+    centres = DeviceFrames(scene, ["albedo"]).read(camera, (32, 24))["albedo"]
+    assert centres.std() > 0.35
+    indirect = np.asarray(found.indirect)
+    assert indirect.std() / indirect.mean() < 0.15  # .4/.5 of one sample, an eighth of it of 64
+    # In units of direct light it is as bright as that.
+    np.testing.assert_allclose(indirect.mean(), (found.diffuse - indirect).mean(), rtol=1e-3)
+
+
+@pytest.mark.parametrize("name", ["gfa", "path-traced", "direct", "ambient"])
+def test_lobes_add_up_to_the_image(name, untrained, tmp_path, monkeypatch):
+    """Where no lamp is in view."""
+    at = dataclasses.replace(
+        site(load_dict(scenes.box("coat")), tmp_path), parts=("full", "indirect", "diffuse", "specular")
+    )
+    if name == "gfa":
+        method = untrained(name, at)
+    else:
+        method = installed().get(name).method
+        method = method.load()(method.settings({"denoise": False}))
+        monkeypatch.setattr(ambient, "_read", lambda folder: np.array([0.3, 0.2, 0.1]))
+        method.prepare(dataclasses.replace(at, weights=tmp_path))
+    below = PinholeCamera((0, -3.4, 1), (0, 0, 0.6), 0.4)
+    found = method.render(view(below), Stages())
+    assert found.specular.any()
+    assert found.diffuse.any()
+    np.testing.assert_allclose(found.diffuse + found.specular, found.color, rtol=1e-4, atol=1e-6)
+
+
 def hall(color):
     """A hall of 24 m: its left wall has a colour and is lit by a lamp that faces it, all else is grey."""
     grey = {"type": "diffuse", "reflectance": scenes.rgb(0.5)}
@@ -597,7 +652,7 @@ def test_a_wall_far_away_colours_what_lies_beyond_the_reach_of_convolutions(weig
         return np.abs(green[hit] / red[hit] - 1).max()
 
     found = method.render(shown, Stages())
-    seen = method._surfaces.read(camera, shown.resolution)["albedo"]
+    seen = DeviceFrames(scene, ["albedo"]).read(camera, shown.resolution)["albedo"]
     assert (seen[1][there] > 2 * seen[0][there]).any()
     assert torch.equal(seen[0][here], seen[1][here])
     assert colour_of(found) > 1e-4
