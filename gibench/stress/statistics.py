@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from gibench.metrics import relmse
 from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.estimate import group_levels
 from gibench.rendering.render import render_frame
-from gibench.rendering.scene import Scene, load_dict
+from gibench.rendering.scene import GUIDED, Scene, load_dict
 from gibench.stress.answers import Float64, largest_z
 from gibench.stress.lights import BELOW, behind_a_gap, floor, lamp
 from gibench.stress.registry import Check, Found, case
@@ -58,7 +59,24 @@ def coverage(
 @case("64 seeds of a furnace, {spp} spp", spp=(16, 64, 256), quick=(64,))
 def seeds_of_a_furnace(spp: int) -> Found:
     """Every pixel against the series; groups of 1, 4 and 16 samples."""
-    color, error = replicates(load_dict(closed_box(0.8, 1.0)), INSIDE, spp)
+    yield from _against_the_series(load_dict(closed_box(0.8, 1.0)), spp)
+
+
+@case("64 seeds of a furnace, guided")
+def seeds_of_a_guided_furnace() -> Found:
+    """The same of paths that follow what was learned."""
+    yield from _against_the_series(guided(load_dict(closed_box(0.8, 1.0))), 64)
+
+
+def guided(scene: Scene) -> Scene:
+    """The scene with a guide."""
+    scene = replace(scene, sampling=GUIDED)
+    assert scene.guide is not None
+    return scene
+
+
+def _against_the_series(scene: Scene, spp: int) -> Found:
+    color, error = replicates(scene, INSIDE, spp)
     answer = closed_answer(0.8, 1.0, DEPTH)
     grey = color[..., 0]
     z = (grey.mean(axis=0) - answer) / (grey.std(axis=0, ddof=1) / np.sqrt(SEEDS))
@@ -84,7 +102,18 @@ SKEWED = (
 @case("64 seeds of a {kind} room, beside path", kind=("matt", "glossy"))
 def seeds_against_path(kind: str) -> Found:
     """Every pixel of a room against Mitsuba's own integrator, 64 seeds of each; then its error bars."""
-    scene, spp = load_dict(small_room(glossy=kind == "glossy")), 64
+    yield from _against_path(load_dict(small_room(glossy=kind == "glossy")), glossy=kind == "glossy")
+
+
+@case("64 seeds of a {kind} room, guided, beside path", kind=("matt", "glossy"))
+def guided_seeds_against_path(kind: str) -> Found:
+    """The same of paths that follow what was learned."""
+    scene = guided(load_dict(small_room(glossy=kind == "glossy")))
+    yield from _against_path(scene, glossy=kind == "glossy")
+
+
+def _against_path(scene: Scene, *, glossy: bool) -> Found:
+    spp = 64
     color, error = replicates(scene, SMALL_ROOM, spp)
     given: dict[str, Any] = {"spp": spp, "max_depth": DEPTH}
     theirs = np.array(
@@ -103,7 +132,7 @@ def seeds_against_path(kind: str) -> Found:
     )
     for count in (16, 64, 256):
         found = (color, error) if count == spp else replicates(scene, SMALL_ROOM, count)
-        known = SKEWED if kind == "glossy" or count == 16 else ""
+        known = SKEWED if glossy or count == 16 else ""
         yield coverage(*found, found[0].mean(axis=0), count, shared=True, known=known)
 
 

@@ -11,6 +11,7 @@ import pytest
 
 from gibench.rendering.backend import select_variant
 from gibench.rendering.camera import PinholeCamera
+from gibench.rendering.guiding import learning as learning_module
 from gibench.rendering.render import render_frame
 from gibench.rendering.scene import GUIDED, load_scene
 from gibench.stress import views
@@ -125,12 +126,16 @@ def test_shades_that_glow_against_bulbs_in_them(tmp_path):
     )
 
 
-def test_guided_and_plain_against_path(tmp_path):
+def test_guided_and_plain_against_path(tmp_path, monkeypatch):
     ratios = {}
     for index in range(ROOMS):
         room, scene, camera = _room(index, tmp_path / str(index))
         guided = replace(scene, sampling=GUIDED)
         _, learning = _cpu_seconds(lambda guided=guided: guided.guide)
+        lights = replace(scene, sampling=GUIDED)
+        with monkeypatch.context() as patch:
+            patch.setattr(learning_module, "FRACTIONS", (0.0,))
+            assert lights.guide is not None
 
         def ours(scene, camera=camera):
             return lambda seed, resolution: render_frame(
@@ -143,6 +148,7 @@ def test_guided_and_plain_against_path(tmp_path):
             ),
             "plain": ours(scene),
             "guided": ours(guided),
+            "guided, lights alone": ours(lights),
         }
         if room.environment.kind != "none" and len(room.openings):
             runs["plain, no portals"] = ours(replace(scene, openings=None))
@@ -152,19 +158,19 @@ def test_guided_and_plain_against_path(tmp_path):
         print(f"\nroom {index}: {room.kind}, {sky}; guide learned in {learning:.1f} CPU s")
         for name, (variance, quiet, worst, seconds) in found.items():
             paths = RESOLUTION[0] * RESOLUTION[1] * SPP
-            shared = learning * paths / (FRAMES * FRAME_PATHS) if name == "guided" else 0.0
+            shared = learning * paths / (FRAMES * FRAME_PATHS) if name.startswith("guided") else 0.0
             slower = (seconds + shared) / base[3]
             row = (variance / base[0] * slower, quiet / base[1] * slower, worst / base[2], slower)
             ratios.setdefault(name, []).append(row)
             print(
-                f"  {name:18} variance {variance:.3f} ({quiet:.3f} trimmed), CPU s {seconds:.2f}, "
+                f"  {name:20} variance {variance:.3f} ({quiet:.3f} trimmed), CPU s {seconds:.2f}, "
                 f"variance x time {row[0]:.2f} ({row[1]:.2f} trimmed), 99.9 % of errors below {worst:.2f}"
             )
     print("\nof path, geometric means over rooms (largest):")
     for name, rows in ratios.items():
         means, largest = np.exp(np.log(rows).mean(axis=0)), np.max(rows, axis=0)
         print(
-            f"  {name:18} variance x time {means[0]:.2f} ({largest[0]:.2f}), "
+            f"  {name:20} variance x time {means[0]:.2f} ({largest[0]:.2f}), "
             f"trimmed {means[1]:.2f} ({largest[1]:.2f}), 99.9 % of errors {means[2]:.2f}, "
             f"time {means[3]:.2f}; {len(rows)} rooms"
         )

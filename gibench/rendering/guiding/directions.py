@@ -3,6 +3,8 @@
 # mypy: disable-error-code="no-untyped-def, misc"
 from __future__ import annotations
 
+import math
+
 import drjit as dr
 import mitsuba as mi
 
@@ -10,6 +12,9 @@ SIDE = 16
 """Bins along a side of the square."""
 
 BINS = SIDE * SIDE
+
+BIN_AREA = 4 * math.pi / BINS
+"""Solid angle of a bin, sr."""
 
 
 def direction_of(square):

@@ -34,8 +34,15 @@ class Grid:
 
     @property
     def places(self) -> int:
-        """Faces of all cells."""
-        return int(np.prod(self.shape)) * FACES
+        """Faces of all cells, and last those of all that lies outside."""
+        return (int(np.prod(self.shape)) + 1) * FACES
+
+    def place_or_outside(self, position, normal, shift):
+        """As `place`, with numbers of their own for what lies outside: the ground before the windows, a facade."""
+        place, inside = self.place(position, normal, shift)
+        # Counted, not known: kernels do not depend on the size of a room.
+        cells = self._size.x * self._size.y * self._size.z
+        return dr.select(inside, place, cells * FACES + place % FACES)
 
     def place(self, position, normal, shift):
         """Number of the place of a surface point (mi.UInt32), and whether it lies in the grid.

@@ -75,8 +75,8 @@ class Guide:
         """Row of the distributions for the side of a surface that si.wi sees. sampler: independent."""
         normal = dr.mulsign(si.n, dr.dot(si.n, si.to_world(si.wi)))
         shift = mi.Vector3f(sampler.next_1d(), sampler.next_1d(), sampler.next_1d()) - 0.5
-        place, inside = self.grid.place(si.p, normal, shift)
-        return dr.gather(mi.UInt32, self._rows, place, active & inside)
+        place = self.grid.place_or_outside(si.p, normal, shift)
+        return dr.gather(mi.UInt32, self._rows, place, active)
 
     def fraction(self, row, bsdf, active):
         """Probability that a bounce is the guide's: 0 without a diffuse lobe, where the BSDF samples better."""

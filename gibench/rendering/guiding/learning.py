@@ -7,6 +7,8 @@ Each pass is guided by what those before it have found.
 # mypy: disable-error-code="no-untyped-def, misc"
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,7 +19,7 @@ from numpy.typing import NDArray
 
 from gibench.rendering.backend import is_scalar, tracing
 from gibench.rendering.free_space import NoFreeSpace, beginnings, free_space, surroundings
-from gibench.rendering.guiding.directions import BINS, bin_of
+from gibench.rendering.guiding.directions import BIN_AREA, BINS, bin_of
 from gibench.rendering.guiding.grid import FACES, Grid
 from gibench.rendering.guiding.guide import Distributions, Guide
 from gibench.rendering.integrator import follow_paths
@@ -36,8 +38,12 @@ PASSES = (1, 2, 4)
 DEPTH = 8
 """Scattering events of the paths."""
 
-GUIDE_FRACTION = 0.4
-"""Of the directions at a diffuse surface that the guide chooses; the other ones bound what it can spoil."""
+FRACTIONS = (0.0, 0.2, 0.4, 0.6)
+"""Of the directions at a diffuse surface that a guide may choose; the other ones bound what it can spoil. A place has
+that which would have made the least noise of the samples of the last pass."""
+
+LEARNING_FRACTION = 0.4
+"""That of the passes in which it learns."""
 
 SPREAD = 0.5
 """Of the guide's directions that follow the root of the second moment of what they bring, which has more regard for
@@ -74,9 +80,11 @@ class Recorder:
         size = lanes * DEPTH
         self.place = dr.full(mi.UInt32, NONE, size)
         self.direction, self.light = dr.full(mi.UInt32, NONE, size), dr.full(mi.UInt32, NONE, size)
-        self.density, self.throughput, self.before, self.lit = (dr.zeros(mi.Float, size) for _ in range(4))
+        self.density, self.plain, self.throughput, self.before, self.lit = (
+            dr.zeros(mi.Float, size) for _ in range(5)
+        )
         self.arrays = [self.place, self.direction, self.light]
-        self.arrays += [self.density, self.throughput, self.before, self.lit]
+        self.arrays += [self.density, self.plain, self.throughput, self.before, self.lit]
         dr.eval(self.arrays)
 
     def met(self, emitter, emitted, depth, active):
@@ -86,15 +94,19 @@ class Recorder:
         """See `integrator.Recorder`."""
         light = scattering.light.light
         normal = dr.mulsign(si.n, dr.dot(si.n, si.to_world(si.wi)))
-        place, inside = self._grid.place(si.p, normal, mi.Vector3f(0))
+        place = self._grid.place_or_outside(si.p, normal, mi.Vector3f(0))
         slot = self._lane + (depth - 1) * self._lanes
-        active = active & inside & (depth <= DEPTH)
+        active = active & (depth <= DEPTH)
         diffuse = mi.has_flag(bsdf.flags(), mi.BSDFFlags.DiffuseReflection) & (scattering.delta ^ True)
         # A mesh whose normals are zero has no frame to say a direction in.
         diffuse &= dr.all(dr.isfinite(scattering.direction))
         dr.scatter(self.place, place, slot, active)
         dr.scatter(self.direction, bin_of(scattering.direction), slot, active & diffuse)
         dr.scatter(self.density, scattering.pdf, slot, active)
+        fraction = self._guide.fraction(row, bsdf, active & diffuse)
+        guides = self._guide.density(row, scattering.direction, active & diffuse)
+        plain = (scattering.pdf - fraction * guides) / (1 - fraction)
+        dr.scatter(self.plain, dr.maximum(plain, 0), slot, active)
         dr.scatter(self.throughput, dr.mean(throughput), slot, active)
         dr.scatter(self.before, dr.mean(before), slot, active)
         dr.scatter(self.light, light, slot, active)
@@ -107,13 +119,14 @@ class Samples:
     """Vertices, (N,) each.
 
     place: number in the grid. direction: bin of the bounce, NONE where the surface is not diffuse; density: of the
-    bounce, per steradian. reflected: radiance that it brought, reflected, over its density. light: number, of the light
-    that was asked, and lit: the radiance of it that is reflected.
+    bounce, per steradian, and plain: that of the BSDF alone. reflected: radiance that it brought, reflected, over its
+    density. light: number, of the light that was asked, and lit: the radiance of it that is reflected.
     """
 
     place: NDArray[np.uint32]
     direction: NDArray[np.uint32]
     density: NDArray[np.float32]
+    plain: NDArray[np.float32]
     reflected: NDArray[np.float64]
     light: NDArray[np.uint32]
     lit: NDArray[np.float64]
@@ -136,12 +149,14 @@ def _trace(scene: Any, guide: Guide, starts: Any, count: Any, number: int) -> Sa
         dr.eval(total, recorder.arrays)
     known = np.array(recorder.place) != NONE
     lane = np.tile(np.arange(LANES), DEPTH)[known]
-    place, direction, light, density, throughput, before, lit = (np.array(a)[known] for a in recorder.arrays)
+    place, direction, light, density, plain, throughput, before, lit = (
+        np.array(a)[known] for a in recorder.arrays
+    )
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         reflected = (np.array(total)[lane].astype(np.float64) - before) / throughput
     tells = np.isfinite(reflected) & np.isfinite(lit)
     reflected, lit = np.where(tells, np.maximum(reflected, 0), 0), np.where(tells, np.maximum(lit, 0), 0)
-    return Samples(place, direction, density, reflected, light, lit.astype(np.float64))
+    return Samples(place, direction, density, plain, reflected, light, lit.astype(np.float64))
 
 
 class _Sums:
@@ -150,15 +165,16 @@ class _Sums:
     def __init__(self, shape: tuple[int, ...], place: NDArray[np.uint32], lights: int) -> None:
         """shape: of the grid. place: of the samples of the first pass."""
         x, y, z = shape
-        visits = np.bincount(place, minlength=x * y * z * FACES)
+        visits = np.bincount(place, minlength=(x * y * z + 1) * FACES)
         places = np.flatnonzero(visits >= FEWEST)
         self.rows = np.zeros(len(visits), dtype=np.uint32)
         self.rows[places] = np.arange(len(places)) + 1
-        self._near = _neighbours(self.rows.reshape(z, y, x, FACES), places)
+        self._near = _neighbours(self.rows[:-FACES].reshape(z, y, x, FACES), places)
         count = len(places) + 1
         self.reflected, self.squares = np.zeros((count, BINS)), np.zeros((count, BINS))
         self.bounces = np.zeros(count)
         self.lit, self.asked = np.zeros((count, lights)), np.zeros((count, lights))
+        self.moments, self.judged = np.zeros((count, len(FRACTIONS))), np.zeros(count)
 
     def add(self, samples: Samples) -> None:
         row = self.rows[samples.place].astype(np.int64)
@@ -175,13 +191,34 @@ class _Sums:
         self.lit += np.bincount(item, np.square(samples.lit), minlength=self.lit.size).reshape(self.lit.shape)
         self.asked += np.bincount(item, minlength=self.lit.size).reshape(self.lit.shape)
 
+    def judge(self, samples: Samples, guide: Distributions) -> None:
+        """Second moments of bounces by each of FRACTIONS, from samples that `guide` has not been learned from.
+
+        Each was drawn with a known density, so its moment is known for every other one (Veach 1997, section 2.5.2).
+        """
+        went = (samples.direction != NONE) & (samples.density > 0)
+        row, drawn = self.rows[samples.place[went]].astype(np.int64), samples.density[went].astype(np.float64)
+        guided, plain = guide.directions[row, samples.direction[went]] / BIN_AREA, samples.plain[went]
+        moment = np.square(samples.reflected[went]) * drawn
+        for k, fraction in enumerate(FRACTIONS):
+            density = (1 - fraction) * plain + fraction * guided
+            values = np.divide(moment, density, out=np.zeros_like(moment), where=density > 0)
+            self.moments[:, k] += np.bincount(row, values, minlength=len(self.judged))
+        self.judged += np.bincount(row, minlength=len(self.judged))
+
     def _blended(self, sums: NDArray[np.float64], count: NDArray[np.float64]) -> NDArray[np.float64]:
         """Means of samples, drawn towards those of the places around."""
         around = self._near @ sums / np.maximum(self._near @ count, 1)
         return np.asarray((sums + PRIOR * around) / (count + PRIOR))
 
-    def learned(self, plain: NDArray[np.float64]) -> Distributions:
-        """plain: (L,) probabilities of the lights without a guide."""
+    def fractions(self) -> NDArray[np.float64]:
+        """(E,) of FRACTIONS, once all samples are judged."""
+        return np.asarray(FRACTIONS)[self._blended(self.moments, self.judged[:, None]).argmin(axis=1)]
+
+    def learned(
+        self, plain: NDArray[np.float64], fraction: NDArray[np.float64] | float = LEARNING_FRACTION
+    ) -> Distributions:
+        """plain: (L,) probabilities of the lights without a guide. fraction: of directions that the guide chooses."""
         even = np.full(BINS, 1 / BINS)
         count = self.bounces[:, None]
         means, known = _distributions(self._blended(self.reflected, count), even)
@@ -193,7 +230,7 @@ class _Sums:
             self.rows,
             (1 - LIGHT_FLOOR) * lights + LIGHT_FLOOR * plain,
             (1 - FLOOR) * directions + FLOOR * even,
-            np.where(known, GUIDE_FRACTION * self.bounces / (self.bounces + DOUBT), 0.0),
+            np.where(known, fraction * self.bounces / (self.bounces + DOUBT), 0.0),
         )
 
 
@@ -212,15 +249,20 @@ def _distributions(
 
 
 def _neighbours(rows: NDArray[np.uint32], places: NDArray[np.int64]) -> Any:
-    """Sparse (E, E): 1 where two rows stand for the same face of cells that touch. rows: (z, y, x, FACES)."""
+    """Sparse (E, E): 1 where two rows stand for the same face of cells that touch. rows: (z, y, x, FACES), of cells.
+
+    places: of rows from 1 on; what lies outside comes last, and is a neighbour of itself alone.
+    """
     from scipy.sparse import csr_array
 
     padded = np.pad(rows, ((1, 1), (1, 1), (1, 1), (0, 0)))
-    at = np.stack(np.unravel_index(places, rows.shape))
-    own, near = [], []
+    cells = places[places < rows.size]
+    at = np.stack(np.unravel_index(cells, rows.shape))
+    outside = np.arange(len(cells), len(places)) + 1
+    own, near = [outside], [outside]
     for step in np.ndindex(3, 3, 3):
         other = padded[at[0] + step[0], at[1] + step[1], at[2] + step[2], at[3]]
-        own.append(np.arange(len(places))[other > 0] + 1)
+        own.append(np.arange(len(cells))[other > 0] + 1)
         near.append(other[other > 0])
     pairs = np.concatenate(own), np.concatenate(near).astype(np.int64)
     count = len(places) + 1
@@ -236,6 +278,12 @@ def _starts(scene: Any) -> NDArray[np.float64]:
         return points[surroundings(scene, points)[0]] if len(points) else points
 
 
+def _unguided(emitters: Sequence[Any]) -> NDArray[np.float64]:
+    """(L,) probabilities with which Mitsuba draws the lights: by their sampling weights."""
+    weights = np.array([emitter.sampling_weight() for emitter in emitters], dtype=np.float64)
+    return weights / weights.sum()
+
+
 def learn(scene: Any) -> Guide | None:
     """The guide of a `Scene` as it is lit now; None where there is nothing to learn, or under the scalar variant."""
     if is_scalar() or not lights_of(scene.mi_scene):
@@ -244,8 +292,7 @@ def learn(scene: Any) -> Guide | None:
     if not len(points):
         return None
     portals = scene.portals if scene.portals is not None and float(scene.portals.fraction[0]) > 0 else None
-    count = len(lights_of(scene.mi_scene))
-    plain = np.full(count, 1 / count)
+    plain = _unguided(lights_of(scene.mi_scene))
     if portals is not None:
         fraction = float(portals.fraction[0])
         plain = np.append((1 - fraction) * plain, fraction)
@@ -254,18 +301,19 @@ def learn(scene: Any) -> Guide | None:
     nothing = Distributions(
         np.zeros(grid.places, np.uint32), np.tile(plain, (2, 1)), np.ones((2, BINS)), np.zeros(2)
     )
-    guide = Guide(scene.mi_scene, portals, grid, nothing)
     starts = mi.Float(points.astype(np.float32).ravel())
     dr.make_opaque(starts)
     sums: _Sums | None = None
-    number = 0
-    for launches in PASSES:
-        for _ in range(launches):
+    numbers = itertools.count()
+    for turn, launches in enumerate(PASSES):
+        learned = nothing if sums is None else sums.learned(plain)
+        guide = Guide(scene.mi_scene, portals, grid, learned)
+        for number in itertools.islice(numbers, launches):
             samples = _trace(scene, guide, starts, dr.opaque(mi.UInt32, len(points)), number)
-            number += 1
             if sums is None:
                 sums = _Sums(grid.shape, samples.place, len(plain))
             sums.add(samples)
-        assert sums is not None
-        guide = Guide(scene.mi_scene, portals, grid, sums.learned(plain))
-    return guide
+            if 0 < turn == len(PASSES) - 1:
+                sums.judge(samples, learned)
+    assert sums is not None
+    return Guide(scene.mi_scene, portals, grid, sums.learned(plain, sums.fractions()))

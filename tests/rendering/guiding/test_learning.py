@@ -58,3 +58,88 @@ def test_probabilities_are_positive_and_sum_to_one():
 def test_an_unknown_sampling_is_refused(tmp_path):
     with pytest.raises(SceneError, match="plain or guided"):
         load_scene(tmp_path / "scene.xml", sampling="best")
+
+
+def judged(brought, guide_density):
+    """`_Sums` of a place whose bounces brought some radiance, a bin each, of a uniform BSDF; (N,), (BINS,)."""
+    from gibench.rendering.guiding.directions import BIN_AREA, BINS
+    from gibench.rendering.guiding.guide import Distributions
+    from gibench.rendering.guiding.learning import NONE, Samples, _Sums
+
+    count, even = len(brought), 1 / (BINS * BIN_AREA)
+    place = np.zeros(count, np.uint32)
+    density = np.full(count, even, np.float32)
+    nothing = np.zeros(count)
+    samples = Samples(
+        place, np.arange(count, dtype=np.uint32) % BINS, density, density, brought, place, nothing
+    )
+    assert samples.direction.max() < NONE
+    sums = _Sums((1, 1, 1), place, 1)
+    directions = np.tile(guide_density, (2, 1))
+    sums.add(samples)
+    sums.judge(samples, Distributions(sums.rows, np.ones((2, 1)), directions, np.zeros(2)))
+    return sums
+
+
+def test_a_place_is_guided_as_much_as_it_pays():
+    from gibench.rendering.guiding.directions import BINS
+    from gibench.rendering.guiding.learning import FRACTIONS
+
+    rng = np.random.default_rng(0)
+    number = np.arange(64 * BINS) % BINS
+    # All light comes from an eighth of the directions, which the guide knows, or takes for dark.
+    bright = number % 8 == 0
+    knows = np.where(np.arange(BINS) % 8 == 0, 8.0, 1e-3) / BINS
+    brought = np.where(bright, rng.exponential(1.0, len(number)), 0.0)
+    assert judged(brought, knows).fractions()[1] == FRACTIONS[-1]
+    assert judged(brought, np.roll(knows, 1)).fractions()[1] == 0
+    # Light that is the same from everywhere is best left to the BSDF, and what brings nothing tells nothing.
+    assert judged(np.ones(len(number)), knows).fractions()[1] == 0
+    assert judged(np.zeros(len(number)), knows).fractions()[1] == 0
+
+
+def test_moments_are_those_of_the_other_densities():
+    """By the closed form: brought² · drawn / mixture, bin by bin."""
+    from gibench.rendering.guiding.directions import BINS
+    from gibench.rendering.guiding.learning import FRACTIONS
+
+    rng = np.random.default_rng(1)
+    brought, guide = rng.exponential(1.0, BINS), rng.dirichlet(np.ones(BINS))
+    found = judged(brought, guide).moments[1]
+    for fraction, moment in zip(FRACTIONS, found, strict=True):
+        mixture = (1 - fraction) / BINS + fraction * guide
+        np.testing.assert_allclose(moment, np.sum(brought**2 / BINS / mixture), rtol=1e-5)
+
+
+def test_what_lies_outside_of_the_grid_has_places_of_its_own():
+    """A place a face, whatever the distance: the ground before a window, a facade."""
+    import mitsuba as mi
+
+    from gibench.rendering.guiding.grid import FACES, Grid
+
+    grid = Grid(np.zeros(3), np.ones(3), cells=27)
+    assert grid.places == (27 + 1) * FACES
+    points = np.array([[0.1, 0.1, 0.1], [0.9, 0.9, 0.9], [5, 0.5, 0.5], [-90, 3, 0.5], [0.5, 0.5, -0.1]])
+    normals = np.array([[0, 0, 1], [0, 0, -1], [0, 0, 1], [1, 0, 0], [0, -1, 0]])
+    found = grid.place_or_outside(
+        mi.Point3f(points.T.astype(np.float32)), mi.Vector3f(normals.T.astype(np.float32)), mi.Vector3f(0)
+    )
+    np.testing.assert_array_equal(found, [4, 26 * FACES + 5, 27 * FACES + 4, 27 * FACES, 27 * FACES + 3])
+
+
+def test_outside_a_light_is_learned_too():
+    """The ground before a window is lit by the sky, and the lamp of the room is not asked for there."""
+    from gibench.rendering.guiding.grid import FACES
+    from tests.rendering import test_portals
+
+    white = scenes.two_sided(type="diffuse", reflectance=scenes.rgb(0.6))
+    ground = scenes.rectangle([9, 0, -0.5], [0, 0, 1], (7, 20), bsdf=white)
+    scene = replace(load_dict(test_portals.room() | {"ground": ground}), sampling=GUIDED)
+    guide = scene.guide
+    rows = np.array(guide._rows)
+    assert len(rows) == guide.grid.places
+    facing_up = rows[-FACES:][4]
+    assert facing_up > 0
+    lamp, sky = np.array(guide._light_probability).reshape(-1, 2)[facing_up]
+    assert sky > 0.9
+    assert lamp > 0.04

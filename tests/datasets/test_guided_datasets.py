@@ -1,0 +1,26 @@
+"""Datasets of guided paths: the guide is learned anew in every process, and alike."""
+
+from __future__ import annotations
+
+from gibench.datasets import open_dataset
+from gibench.datasets.making import make
+from gibench.datasets.recipes import check_recipe
+
+TINY = {"seed": 4, "kinds": ["bathroom"], "views": 2, "resolution": [16, 12], "spp": 4, "sampling": "guided"}
+
+
+def frames(root):
+    return [path.read_bytes() for path in sorted(root.glob("rooms/*/frames/*.exr"))]
+
+
+def test_workers_and_a_run_in_two_parts_change_no_bit(tmp_path):
+    undisturbed, parts = tmp_path / "undisturbed", tmp_path / "parts"
+    make(undisturbed, check_recipe({**TINY, "rooms": 2}))
+    for rooms in (1, 2):
+        make(parts, check_recipe({**TINY, "rooms": rooms}), workers=2)
+    assert len(frames(undisturbed)) == 4
+    assert frames(parts) == frames(undisturbed)
+    # And they are guided.
+    make(tmp_path / "plain", check_recipe({**TINY, "rooms": 1, "sampling": "plain"}))
+    plain, guided = (open_dataset(root)[0]["color"] for root in (tmp_path / "plain", undisturbed))
+    assert (plain != guided).any()
