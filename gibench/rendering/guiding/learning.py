@@ -191,7 +191,7 @@ class _Sums:
         self.lit += np.bincount(item, np.square(samples.lit), minlength=self.lit.size).reshape(self.lit.shape)
         self.asked += np.bincount(item, minlength=self.lit.size).reshape(self.lit.shape)
 
-    def judge(self, samples: Samples, guide: Distributions) -> None:
+    def add_moments(self, samples: Samples, guide: Distributions) -> None:
         """Second moments of bounces by each of FRACTIONS, from samples that `guide` has not been learned from.
 
         Each was drawn with a known density, so its moment is known for every other one (Veach 1997, section 2.5.2).
@@ -314,6 +314,6 @@ def learn(scene: Any) -> Guide | None:
                 sums = _Sums(grid.shape, samples.place, len(plain))
             sums.add(samples)
             if 0 < turn == len(PASSES) - 1:
-                sums.judge(samples, learned)
+                sums.add_moments(samples, learned)
     assert sums is not None
     return Guide(scene.mi_scene, portals, grid, sums.learned(plain, sums.fractions()))

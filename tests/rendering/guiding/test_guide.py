@@ -278,13 +278,14 @@ def test_a_mesh_without_normals_does_no_harm(tmp_path):
     assert abs(z.mean()) < 4 / np.sqrt(len(z))
 
 
-def test_the_guide_leaves_glossy_lobes_alone():
+def test_the_guide_leaves_glossy_lobes_alone(monkeypatch):
     """Where the specular lobe alone is asked for, as for glossy probes, frames have its own samples: they are those of
     a guide that chooses no direction."""
     from gibench.rendering.backend import tracing
     from gibench.rendering.integrator import scatter_paths
     from gibench.rendering.sampling import IndependentSampler
 
+    monkeypatch.setattr(LEARNING + ".FRACTIONS", (0.4,))
     guided = replace(load_dict(scenes.box("coat")), sampling=GUIDED)
 
     def densities(lobes):

@@ -77,7 +77,7 @@ def judged(brought, guide_density):
     sums = _Sums((1, 1, 1), place, 1)
     directions = np.tile(guide_density, (2, 1))
     sums.add(samples)
-    sums.judge(samples, Distributions(sums.rows, np.ones((2, 1)), directions, np.zeros(2)))
+    sums.add_moments(samples, Distributions(sums.rows, np.ones((2, 1)), directions, np.zeros(2)))
     return sums
 
 
