@@ -134,10 +134,11 @@ def _spread(rng: np.random.Generator, points: NDArray[np.float64]) -> NDArray[np
     return shuffled[chosen]
 
 
-def free_space(scene: Scene) -> NDArray[np.float64]:
+def free_space(scene: Scene, rounds: int = ROUNDS) -> NDArray[np.float64]:
     """(N, 3) points all over the free space of the room, evenly spread, metres.
 
-    Raises NoFreeSpace where no point of the scene is enclosed.
+    rounds: after which the walk ends at the latest; 6 of them find three quarters of the cells in two fifths of the
+    time. Raises NoFreeSpace where no point of the scene is enclosed.
     """
     points = beginnings(scene)
     points = points[enclosed(scene, points)] if len(points) else points
@@ -150,7 +151,7 @@ def free_space(scene: Scene) -> NDArray[np.float64]:
     rng = np.random.default_rng(0)
     found = points[[np.argmax((np.minimum(distance, most) ** 3).mean(axis=1))]]
     cells = found
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         origins = cells[rng.integers(len(cells), size=STEPS)]
         directions = rng.normal(size=(STEPS, 3))
         directions /= np.linalg.norm(directions, axis=1, keepdims=True)

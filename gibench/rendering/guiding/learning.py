@@ -67,6 +67,9 @@ FEWEST = 8
 MARGIN = 0.6
 """Metres from the free space of a room to the edge of the grid."""
 
+START_ROUNDS = 6
+"""Of the walk that finds where paths start. They go on from there, so a nook that it leaves out is seen as well."""
+
 NONE = 0xFFFFFFFF
 
 
@@ -272,7 +275,7 @@ def _neighbours(rows: NDArray[np.uint32], places: NDArray[np.int64]) -> Any:
 def _starts(scene: Any) -> NDArray[np.float64]:
     """(N, 3) points all over the room; in a scene that encloses nothing, free ones next to its shapes."""
     try:
-        return free_space(scene)
+        return free_space(scene, START_ROUNDS)
     except NoFreeSpace:
         points = beginnings(scene)
         return points[surroundings(scene, points)[0]] if len(points) else points
