@@ -259,7 +259,7 @@ def compare(
         Path | None, typer.Option("--in", help="Compare two methods of this run.", show_default=False)
     ] = None,
     metric: Annotated[str, typer.Option(help="Of two folders: the metric to compare by.")] = "rmse_display",
-    part: Annotated[str, typer.Option(help="Of two folders: full, specular or indirect.")] = "full",
+    part: Annotated[str, typer.Option(help="Of two folders: full, diffuse, specular or indirect.")] = "full",
     room: OneRoom = None,
     group: OneGroup = None,
 ) -> None:

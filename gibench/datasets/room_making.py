@@ -205,7 +205,7 @@ class LoadedRoom:
         """From the folder that it was written into."""
         from gibench.rendering.scene import load_scene
 
-        scene = load_scene(folder / "scene.xml", share_kernels=True, sampling=recipe.sampling)
+        scene = load_scene(folder / "scene.xml", share_kernels=True, sampling=recipe.room_sampling)
         if not room.lightings:
             return cls(recipe, room, scene, None)
         from gibench.rendering.light_rig import LightRig

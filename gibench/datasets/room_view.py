@@ -88,7 +88,7 @@ def _view_of_room(folder: Path, view: int, sampling: str | None) -> RoomView:
         check_scene_file(root, folder)
     except gate.GateError as problem:
         raise DatasetError(f"{folder / SCENE} is not read: {problem}") from None
-    scene = load_scene(folder / SCENE, sampling=sampling or recipe.sampling)
+    scene = load_scene(folder / SCENE, sampling=sampling or recipe.room_sampling)
     if shot.lighting.kind != "own":
         rig = LightRig(scene, panoramas=shot.lighting.kind == "environment")
         rig.set(shot.lighting)

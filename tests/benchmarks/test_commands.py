@@ -208,7 +208,7 @@ def test_from_a_run_to_comparisons(capsys, tmp_path, track, scenes_only):
     said = capsys.readouterr().out
     assert re.search(r"^full / specular$", said, re.M)
     assert re.search(r"^plain shade=0\.5 +0\.\d+ / - +[\d.]+$", said, re.M)
-    assert "--parts: 'diffuse' is not allowed" in refused(capsys, "board", scenes_only, "--parts", "diffuse")
+    assert "--parts: 'gloss' is not allowed" in refused(capsys, "board", scenes_only, "--parts", "gloss")
     assert "no room 'kitchen'" in refused(capsys, "board", scenes_only, "--room", "kitchen")
 
     assert "'constant' has several settings" in refused(
@@ -218,7 +218,7 @@ def test_from_a_run_to_comparisons(capsys, tmp_path, track, scenes_only):
         capsys, "compare", "--in", scenes_only, "plane", "constant"
     )
     assert "no metric is named 'rmsee'" in refused(capsys, "compare", "a", "b", "--metric", "rmsee")
-    assert "--part: 'diffuse' is not allowed" in refused(capsys, "compare", "a", "b", "--part", "diffuse")
+    assert "--part: 'gloss' is not allowed" in refused(capsys, "compare", "a", "b", "--part", "gloss")
     assert "holds a run with another preset" in refused(
         capsys, "run", "--preset", "smoke", "--methods", "plain", "--out", scenes_only
     )

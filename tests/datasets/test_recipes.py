@@ -230,3 +230,25 @@ def test_whatever_a_recipe_holds_is_answered_in_a_line(tmp_path, content, says):
 def test_a_byte_order_mark_is_skipped(tmp_path):
     (tmp_path / "r.toml").write_bytes(b"\xef\xbb\xbfviews = 3\n")
     assert load_recipe(tmp_path / "r.toml").views == 3
+
+
+def test_many_paths_of_a_room_are_guided_where_nothing_is_said():
+    """From as many on as learning pays for, in the light that the room keeps."""
+    assert [load_preset(name).room_sampling for name in ("smoke", "small", "paper", "unseen")] == [
+        "plain",
+        "plain",
+        "guided",
+        "guided",
+    ]
+    many = {"views": 4, "resolution": [256, 256], "spp": 64}
+    assert check_recipe(many).room_sampling == "guided"
+    assert check_recipe({**many, "views": 3}).room_sampling == "plain"
+    assert check_recipe({**many, "lighting": "area-light"}).room_sampling == "plain"
+    assert (
+        check_recipe({**many, "spp": 1, "channels": ["depth"], "sampling": "guided"}).room_sampling
+        == "guided"
+    )
+    # What was begun as one of them is not continued as the other.
+    assert check_recipe(many).identity() == check_recipe({**many, "sampling": "guided"}).identity()
+    assert check_recipe(many).identity() != check_recipe({**many, "sampling": "plain"}).identity()
+    assert "sampling" not in check_recipe({**many, "sampling": "plain"}).identity()
