@@ -7,6 +7,7 @@ finds it prints with the words that try that input again.
 from __future__ import annotations
 
 import argparse
+import copy
 import faulthandler
 import json
 import os
@@ -109,7 +110,7 @@ def rewritten(rng: random.Random, content: bytes) -> bytes:
         elif way == 2 and isinstance(holder, list):
             holder += holder[key : key + 1] * rng.choice((1, 100))
         else:
-            holder[key] = rng.choice(INTERESTING)
+            holder[key] = copy.deepcopy(rng.choice(INTERESTING))  # it may be changed in turn
     text = json.dumps(value)
     return flipped(rng, text.encode()) if rng.random() < 0.1 else text.encode("utf-8", "surrogatepass")
 

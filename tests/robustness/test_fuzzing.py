@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import os
 import random
 import subprocess
@@ -39,6 +40,14 @@ def test_the_same_seed_gives_the_same_input():
     assert first == again
     others = {fuzzing.damaged(random.Random(f"x-1-{number}"), content, "a.json") for number in range(50)}
     assert len(others) > 25
+
+
+def test_damage_leaves_the_interesting_values_alone():
+    """One that is put in and then changed in turn once held itself, and every input after it."""
+    content, before = b'{"a": [1, 2, 3], "b": {"c": "d"}}', copy.deepcopy(fuzzing.INTERESTING)
+    for number in range(2000):
+        fuzzing.rewritten(random.Random(number), content)
+    assert before == fuzzing.INTERESTING
 
 
 def _write(root: Path) -> None:
