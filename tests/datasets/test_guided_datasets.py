@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from gibench.cli.making import describe
 from gibench.datasets import open_dataset
 from gibench.datasets.making import make
+from gibench.datasets.manifest import read_manifest
 from gibench.datasets.recipes import check_recipe
 
 TINY = {"seed": 4, "kinds": ["bathroom"], "views": 2, "resolution": [16, 12], "spp": 4, "sampling": "guided"}
@@ -13,7 +15,7 @@ def frames(root):
     return [path.read_bytes() for path in sorted(root.glob("rooms/*/frames/*.exr"))]
 
 
-def test_workers_and_a_run_in_two_parts_change_no_bit(tmp_path):
+def test_workers_and_a_run_in_two_parts_change_no_bit(tmp_path, capsys):
     undisturbed, parts = tmp_path / "undisturbed", tmp_path / "parts"
     make(undisturbed, check_recipe({**TINY, "rooms": 2}))
     for rooms in (1, 2):
@@ -24,3 +26,8 @@ def test_workers_and_a_run_in_two_parts_change_no_bit(tmp_path):
     make(tmp_path / "plain", check_recipe({**TINY, "rooms": 1, "sampling": "plain"}))
     plain, guided = (open_dataset(root)[0]["color"] for root in (tmp_path / "plain", undisturbed))
     assert (plain != guided).any()
+    # Which is said to whoever has a dataset: by its card and by `gibench dataset info`.
+    for root, said in ((undisturbed, True), (tmp_path / "plain", False)):
+        assert ("4 samples a pixel along guided paths" in (root / "DATASET.md").read_text()) == said
+        describe(root, read_manifest(root))
+        assert ("guided: lights and directions" in capsys.readouterr().out) == said
