@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import itertools
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 
 from gibench.baselines.method import Knob, Method, MethodError, Setting
@@ -92,8 +93,13 @@ def parse_overrides(
 
 
 def _value(method: Method, knob: Knob, text: str) -> Setting:
+    number = None
+    with suppress(ValueError):
+        number = float(text)
     for value in knob.values:
         if text.lower() == str(value).lower():
+            return value
+        if number is not None and not isinstance(value, bool) and value == number:  # 1 for 1.0
             return value
     allowed = ", ".join(str(value) for value in knob.values)
     raise MethodError(f"{method.id}: {knob.name} = {text} is not allowed; allowed are {allowed}")

@@ -49,6 +49,13 @@ def test_overrides_win_and_show_in_the_label():
     ]
 
 
+@pytest.mark.parametrize("text", ["path-traced.radius=.5", "path-traced.radius=5e-1", "path-traced.spp=2.0"])
+def test_a_number_may_be_written_in_any_way(text):
+    (values,) = parse_overrides([text], {"path-traced": TRACED})["path-traced"].values()
+    assert values in ((0.5,), (2,))
+    assert type(values[0]) is (int if "spp" in text else float)  # as the method has it, for keys of results
+
+
 @pytest.mark.parametrize(
     ("text", "error", "says"),
     [
