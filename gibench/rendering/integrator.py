@@ -163,7 +163,7 @@ def _scatter(
     )
     # Where the sample has failed, another direction may be taken in its place.
     expected = dr.select(dr.max(weight) > 0, weight, 1)
-    if guide is None:
+    if guide is None or not guide.directions:
         direction, pdf, eta = si.to_world(bounce.wo), bounce.pdf, bounce.eta
         delta, guided = mi.has_flag(bounce.sampled_type, mi.BSDFFlags.Delta), mi.Bool(False)
     else:

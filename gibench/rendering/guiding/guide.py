@@ -37,12 +37,15 @@ class Guide:
     """Chooses lights and directions for paths.
 
     All that it returns comes with its exact density, and no light and no direction that reflects light is left out, so
-    that estimates are unbiased whatever was learned. arrays: those of the device, for kernels that are recorded.
+    that estimates are unbiased whatever was learned. directions: whether it chooses directions too; a kernel without
+    them takes a sixth less time. arrays: those of the device, for kernels that are recorded.
     """
 
-    def __init__(self, mi_scene: Any, portals: Any, grid: Grid, learned: Distributions) -> None:
+    def __init__(
+        self, mi_scene: Any, portals: Any, grid: Grid, learned: Distributions, *, directions: bool = True
+    ) -> None:
         """portals: `Portals` that light comes in by, or None. Under a vectorised variant, with at least one light."""
-        self.grid, self.portals = grid, portals
+        self.grid, self.portals, self.directions = grid, portals, directions
         emitters = lights_of(mi_scene)
         light_table, light_probability = alias_tables(learned.lights)
         table, probability = alias_tables(learned.directions)

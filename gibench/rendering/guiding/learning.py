@@ -45,6 +45,10 @@ that which would have made the least noise of the samples of the last pass."""
 LEARNING_FRACTION = 0.4
 """That of the passes in which it learns."""
 
+DIRECTIONS_PAY = 0.15
+"""Of the second moment of bounces, the share that a guide has to take away, in the mean over places, to choose directions
+at all: they cost about as much of the time of a path."""
+
 SPREAD = 0.5
 """Of the guide's directions that follow the root of the second moment of what they bring, which has more regard for
 what is bright and rare; the others follow the mean (Rath et al. 2020)."""
@@ -218,6 +222,16 @@ class _Sums:
         """(E,) of FRACTIONS, once all samples are judged."""
         return np.asarray(FRACTIONS)[self._blended(self.moments, self.judged[:, None]).argmin(axis=1)]
 
+    def gain_of_directions(self) -> float:
+        """Share of the second moment of bounces that directions of the guide take away, in the mean over judged ones.
+
+        Place by place: a sum over all of them would be that of the few brightest samples.
+        """
+        moments = self._blended(self.moments, self.judged[:, None])
+        plain, best = moments[:, 0], moments.min(axis=1)
+        left = np.divide(best, plain, out=np.ones_like(best), where=plain > 0)
+        return float(1 - self.judged @ left / self.judged.sum()) if self.judged.any() else 0.0
+
     def learned(
         self, plain: NDArray[np.float64], fraction: NDArray[np.float64] | float = LEARNING_FRACTION
     ) -> Distributions:
@@ -319,4 +333,10 @@ def learn(scene: Any) -> Guide | None:
             if 0 < turn == len(PASSES) - 1:
                 sums.add_moments(samples, learned)
     assert sums is not None
-    return Guide(scene.mi_scene, portals, grid, sums.learned(plain, sums.fractions()))
+    return Guide(
+        scene.mi_scene,
+        portals,
+        grid,
+        sums.learned(plain, sums.fractions()),
+        directions=sums.gain_of_directions() > DIRECTIONS_PAY,
+    )

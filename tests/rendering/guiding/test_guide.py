@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from gibench.rendering.camera import PinholeCamera
+from gibench.rendering.guiding.learning import DIRECTIONS_PAY
 from gibench.rendering.render import render_frame
 from gibench.rendering.scene import GUIDED, load_dict
 from tests.rendering import scenes, test_portals
@@ -22,8 +23,9 @@ LEARNING = "gibench.rendering.guiding.learning"
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
-    """A guide from few paths, which is as unbiased as any."""
+    """A guide from few paths, which is as unbiased as any, and chooses directions wherever it is."""
     monkeypatch.setattr(LEARNING + ".LANES", 1 << 14)
+    monkeypatch.setattr(LEARNING + ".DIRECTIONS_PAY", -1.0)
     monkeypatch.setattr(LEARNING + ".PASSES", (1, 2))
 
 
@@ -126,12 +128,15 @@ def z_scores(one, other):
     return difference[error > 0] / error[error > 0]
 
 
-@pytest.mark.parametrize("name", SCENES)
-def test_same_mean(name):
+@pytest.mark.parametrize(
+    ("name", "directions"), [*((name, True) for name in SCENES), ("coat", False), ("portals", False)]
+)
+def test_same_mean(name, directions, monkeypatch):
+    monkeypatch.setattr(LEARNING + ".DIRECTIONS_PAY", -1.0 if directions else 1.0)
     plain = SCENES[name]()
     camera = PinholeCamera((0.0, -0.8, 1.0), (0.3, 1.0, 0.8), 1.2) if name == "portals" else scenes.CAMERA
     guided = replace(plain, sampling=GUIDED)
-    assert guided.guide is not None
+    assert guided.guide.directions == directions
     few = (
         {"resolution": (8, 8), "spp": 252} if name == "a thousand lamps" else {}
     )  # Mitsuba is slow with them
@@ -237,10 +242,12 @@ def test_without_a_light_there_is_no_guide():
 
 
 def test_a_lamp_behind_a_baffle_has_less_noise(monkeypatch):
-    """Light that only second bounces find is what a guide is for."""
+    """Light that only second bounces find is what directions of a guide are for; without the baffle there are none."""
     monkeypatch.setattr(LEARNING + ".LANES", 1 << 17)
     monkeypatch.setattr(LEARNING + ".PASSES", (1, 2, 4))
+    monkeypatch.setattr(LEARNING + ".DIRECTIONS_PAY", DIRECTIONS_PAY)
     description = scenes.box("diffuse")
+    assert not replace(load_dict(description), sampling=GUIDED).guide.directions
     description["baffle"] = scenes.rectangle(
         [0, 0, 1.9], [0, 0, -1], (0.4, 0.4), bsdf={"type": "ref", "id": "wall"}
     )
@@ -252,7 +259,9 @@ def test_a_lamp_behind_a_baffle_has_less_noise(monkeypatch):
         ordered = np.sort(np.mean(squares, axis=0), axis=None)
         return ordered[: int(0.97 * len(ordered))].mean()
 
-    assert variance(replace(plain, sampling=GUIDED)) < 0.7 * variance(plain)
+    guided = replace(plain, sampling=GUIDED)
+    assert guided.guide.directions
+    assert variance(guided) < 0.7 * variance(plain)
 
 
 def test_a_mesh_without_normals_does_no_harm(tmp_path):

@@ -96,6 +96,12 @@ def test_a_place_is_guided_as_much_as_it_pays():
     # Light that is the same from everywhere is best left to the BSDF, and what brings nothing tells nothing.
     assert judged(np.ones(len(number)), knows).fractions()[1] == 0
     assert judged(np.zeros(len(number)), knows).fractions()[1] == 0
+    # So much of the second moment is gone: that of .4 even and .6 of the guide, which is where the light is.
+    assert judged(brought, knows).gain_of_directions() == pytest.approx(1 - 1 / (0.4 + 0.6 * 8), rel=1e-2)
+    assert judged(np.ones(len(number)), knows).gain_of_directions() == 0
+    assert judged(np.zeros(len(number)), knows).gain_of_directions() == 0
+    huge = judged(1e100 * brought, knows).gain_of_directions()  # radiance over throughput, both float32
+    assert huge == pytest.approx(judged(brought, knows).gain_of_directions())
 
 
 def test_moments_are_those_of_the_other_densities():
