@@ -17,7 +17,8 @@ LEARNING = "gibench.rendering.guiding.learning"
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
     monkeypatch.setattr(LEARNING + ".LANES", 1 << 14)
-    monkeypatch.setattr(LEARNING + ".PASSES", (1, 1))
+    monkeypatch.setattr(LEARNING + ".PASSES_OF_DIRECTIONS", (1,))
+    monkeypatch.setattr(LEARNING + ".DIRECTIONS_PAY", -1.0)
 
 
 def test_threads_and_loads_change_no_bit():

@@ -22,7 +22,8 @@ LEARNING = "gibench.rendering.guiding.learning"
 @pytest.fixture
 def quick(monkeypatch):
     monkeypatch.setattr(LEARNING + ".LANES", 1 << 13)
-    monkeypatch.setattr(LEARNING + ".PASSES", (1, 1))
+    monkeypatch.setattr(LEARNING + ".PASSES_OF_DIRECTIONS", (1,))
+    monkeypatch.setattr(LEARNING + ".DIRECTIONS_PAY", -1.0)
 
 
 def frame(scene, camera=scenes.CAMERA, **options):
