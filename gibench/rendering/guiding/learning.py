@@ -33,8 +33,8 @@ LANES = 1 << 17
 """Paths at a time. Twice as many learn no better guide: the variance was 1.08 and 1.09 times that in two rooms."""
 
 PASSES = (1, 1)
-"""Paths of a pass, as a multiple of LANES. As much is enough to know the lights: with 7 instead of 2 the variance was the
-same within a hundredth in three of four rooms, and .94 of it in the fourth."""
+"""Paths of a pass, as a multiple of LANES. That is enough to know the lights: with 7 instead of 2 the variance was the
+same within 3 % in three of four rooms, and .94 of it in the fourth."""
 
 PASSES_OF_DIRECTIONS = (1, 4)
 """Those that follow where directions pay."""

@@ -122,8 +122,11 @@ def frame(scene, camera=scenes.CAMERA, **options):
 
 
 def z_score_of_means(one, other):
-    """The difference of the means of two frames in standard errors. Unlike the mean of the z-scores of pixels it has next
-    to no bias where samples are skewed: a pixel that misses what is rare is too dark and claims too small an error."""
+    """The difference of the means of two frames in standard errors.
+
+    The mean of the z-scores of pixels has a bias where samples are skewed: a pixel that misses what is rare is too dark
+    and claims too small an error.
+    """
     errors = [frame["color_se"][..., 1].astype(float) for frame in (one, other)]
     difference = one["color"][..., 1].astype(float) - other["color"][..., 1]
     return difference.sum() / np.sqrt(np.square(errors).sum())
