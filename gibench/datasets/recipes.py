@@ -42,8 +42,8 @@ OPTIONS = {
 #: Channels whose samples are counted until an error is reached; radiance cues take as many.
 RADIANCE = frozenset((*contract.SETS["radiance"], *contract.SAMPLED))
 
-#: Paths of a room from which on they are guided where nothing is said. Learning a guide takes the CPU time of 1.5 million
-#: plain paths, of 4 million with directions, and guided ones take half of their time at equal noise.
+#: Paths of a room from which on they are guided where nothing is said. Learning a guide takes the CPU time of 1.5
+#: million plain paths, of 4 million with directions, and guided ones take half of their time at equal noise.
 GUIDED_FROM = 1 << 23
 
 #: Samples a pixel that a target error takes at least.
