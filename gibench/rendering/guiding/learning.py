@@ -69,8 +69,8 @@ DOUBT = 16
 
 PRIOR, PRIOR_OF_DIRECTIONS = 16, 1024
 """A place counts the mean of the 27 cells around it as this many samples of its own: for the lights, whose shadows have
-edges, and for directions, of which there are 256. With 16 for both the variance of three rooms by day was 1.1 to 1.3
-times that."""
+edges, and for directions, of which there are 256. With 16 for both the variance of three rooms was 1.1 to 1.2 times
+that."""
 
 FEWEST = 8
 """Samples of the first pass that make a place known."""
