@@ -57,7 +57,7 @@ def describe(root: Path, manifest: dict[str, Any]) -> None:
         splits = ", ".join(f"{name} {count}" for name, count in totals["splits"].items())
         say(_row("rooms", f"{totals['rooms']}{done}"))
         say(_row("frames", f"{totals['frames']} ({splits}), {width}x{height}, {samples}"))
-    if recipe.get("sampling") == "guided":
+    if manifest["identity"].get("sampling") == "guided":
         say(_row("paths", "guided: lights and directions are chosen by what is learned of a room"))
     if recipe.get("lighting", "own") != "own":
         maps = f" ({', '.join(map(str, recipe['environments']))})" if recipe["environments"] else ""

@@ -50,7 +50,7 @@ def card(root: Path, manifest: Mapping[str, Any], table: pd.DataFrame) -> str:
         if recipe["error"] is None
         else f"samples until the median relative error is below {recipe['error']:g}"
     )
-    if recipe.get("sampling") == "guided":
+    if manifest["identity"].get("sampling") == "guided":
         samples += " along guided paths"
     kinds = table.drop_duplicates("room")["kind"].value_counts()
     splits = table["split"].value_counts()

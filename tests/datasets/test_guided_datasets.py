@@ -31,3 +31,12 @@ def test_workers_and_a_run_in_two_parts_change_no_bit(tmp_path, capsys):
         assert ("4 samples a pixel along guided paths" in (root / "DATASET.md").read_text()) == said
         describe(root, read_manifest(root))
         assert ("guided: lights and directions" in capsys.readouterr().out) == said
+
+
+def test_paths_that_are_guided_unasked_are_said_to_be(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("gibench.datasets.recipes.GUIDED_FROM", 1)
+    root = tmp_path / "many"
+    make(root, check_recipe({**TINY, "rooms": 1, "views": 1, "sampling": None}))
+    assert "along guided paths" in (root / "DATASET.md").read_text()
+    describe(root, read_manifest(root))
+    assert "guided: lights and directions" in capsys.readouterr().out
