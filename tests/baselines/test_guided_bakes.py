@@ -37,7 +37,7 @@ def pair():
     guided = replace(plain, sampling=GUIDED)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(LEARNING + ".LANES", 1 << 14)
-        patch.setattr(LEARNING + ".PASSES_OF_DIRECTIONS", (1,))
+        patch.setattr(LEARNING + ".LOOKS", 1 << 16)
         patch.setattr(LEARNING + ".DIRECTIONS_PAY", -1.0)
         assert guided.guide is not None
     return plain, guided

@@ -134,7 +134,7 @@ def test_guided_and_plain_against_path(tmp_path, monkeypatch):
         _, learning = _cpu_seconds(lambda guided=guided: guided.guide)
         lights = replace(scene, sampling=GUIDED)
         with monkeypatch.context() as patch:
-            patch.setattr(learning_module, "FRACTIONS", (0.0,))
+            patch.setattr(learning_module, "DIRECTIONS_PAY", 1.0)
             assert lights.guide is not None
 
         def ours(scene, camera=camera):

@@ -17,7 +17,7 @@ LEARNING = "gibench.rendering.guiding.learning"
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
     monkeypatch.setattr(LEARNING + ".LANES", 1 << 14)
-    monkeypatch.setattr(LEARNING + ".PASSES_OF_DIRECTIONS", (1,))
+    monkeypatch.setattr(LEARNING + ".LOOKS", 1 << 16)
     monkeypatch.setattr(LEARNING + ".DIRECTIONS_PAY", -1.0)
 
 
@@ -62,29 +62,29 @@ def test_an_unknown_sampling_is_refused(tmp_path):
 
 
 def judged(brought, guide_density):
-    """`_Sums` of a place whose bounces brought some radiance, a bin each, of a uniform BSDF; (N,), (BINS,)."""
+    """`Sums` of a place whose bounces brought some radiance, a bin each, of a uniform BSDF; (N,), (BINS,)."""
     from gibench.rendering.guiding.directions import BIN_AREA, BINS
     from gibench.rendering.guiding.guide import Distributions
-    from gibench.rendering.guiding.learning import NONE, Samples, _Sums
+    from gibench.rendering.guiding.paths import NONE, Samples
+    from gibench.rendering.guiding.sums import Sums
 
     count, even = len(brought), 1 / (BINS * BIN_AREA)
     place = np.zeros(count, np.uint32)
     density = np.full(count, even, np.float32)
     nothing = np.zeros(count)
     samples = Samples(
-        place, np.arange(count, dtype=np.uint32) % BINS, density, density, brought, place, nothing
+        place, np.arange(count, dtype=np.uint32) % BINS, density, density, brought, place, nothing, nothing
     )
     assert samples.direction.max() < NONE
-    sums = _Sums((1, 1, 1), place, 1)
+    sums = Sums((1, 1, 1), place, 1)
     directions = np.tile(guide_density, (2, 1))
-    sums.add(samples)
     sums.add_moments(samples, Distributions(sums.rows, np.ones((2, 1)), directions, np.zeros(2)))
     return sums
 
 
 def test_a_place_is_guided_as_much_as_it_pays():
     from gibench.rendering.guiding.directions import BINS
-    from gibench.rendering.guiding.learning import FRACTIONS
+    from gibench.rendering.guiding.sums import FRACTIONS
 
     rng = np.random.default_rng(0)
     number = np.arange(64 * BINS) % BINS
@@ -108,7 +108,7 @@ def test_a_place_is_guided_as_much_as_it_pays():
 def test_moments_are_those_of_the_other_densities():
     """By the closed form: brought² · drawn / mixture, bin by bin."""
     from gibench.rendering.guiding.directions import BINS
-    from gibench.rendering.guiding.learning import FRACTIONS
+    from gibench.rendering.guiding.sums import FRACTIONS
 
     rng = np.random.default_rng(1)
     brought, guide = rng.exponential(1.0, BINS), rng.dirichlet(np.ones(BINS))
@@ -150,3 +150,60 @@ def test_outside_a_light_is_learned_too():
     lamp, sky = np.array(guide._light_probability).reshape(-1, 2)[facing_up]
     assert sky > 0.9
     assert lamp > 0.04
+
+
+def learner_in(description):
+    """`_Learner` of a scene that paths start in the middle of."""
+    from gibench.rendering.guiding.learning import _Learner, _unguided
+    from gibench.rendering.light_numbers import lights_of
+
+    scene = load_dict(description)
+    middle = np.random.default_rng(0).uniform(-0.5, 0.5, (50, 3))
+    return _Learner(scene, None, _unguided(lights_of(scene.mi_scene)), middle)
+
+
+def test_a_look_brings_what_is_there():
+    """Radiance alike from everywhere comes in by the cosine; where all is dark, emission has its share alone."""
+    from gibench.rendering.guiding.directions import BINS, direction_in
+    from gibench.rendering.guiding.sights import look_around
+    from gibench.stress.scenes import closed_box
+
+    learner = learner_in(closed_box(0.6, 1.0))
+    guide = learner.guide(directions=False)
+
+    def looks(radiance):
+        everywhere = np.full(learner.grid.places, radiance)
+        return look_around(learner.scene, guide, learner._starts, everywhere, 1 << 14)
+
+    import mitsuba as mi
+
+    dark, bright = looks(0.0), looks(2.5)
+    assert len(dark.place) == 1 << 14
+    np.testing.assert_allclose(bright.brought - dark.brought, 2.5, rtol=1e-5)
+    # Walls of radiance 1: less than that, since they are also found by samples of lights.
+    assert 0 < dark.brought.mean() < 0.9
+    assert dark.brought.max() <= 1
+    # Their density is the cosine over π, to the width of a bin.
+    towards = np.array(direction_in(mi.UInt32(np.arange(BINS)), mi.Point2f(0.5))).T[bright.direction]
+    face = bright.place % 6
+    cosine = np.where(face % 2 == 0, 1, -1) * towards[np.arange(len(face)), face // 2]
+    np.testing.assert_allclose(bright.density, np.maximum(cosine, 0) / np.pi, atol=0.09)
+
+
+def test_what_a_place_sends_is_what_it_reflects():
+    """In a furnace of reflectance ρ whose walls shine with 1 it is ρ + ρ² + …, as far as paths go."""
+    from gibench.stress.scenes import closed_box
+
+    sums = learner_in(closed_box(0.3, 1.0)).lights()
+    np.testing.assert_allclose(np.median(sums.radiance()[sums.rows > 0]), 0.3 / 0.7, rtol=0.1)
+    np.testing.assert_allclose(sums.sent.sum() / sums.met.sum(), 0.3 / 0.7, rtol=0.02)
+
+
+def test_radiance_beyond_single_precision_is_no_harm():
+    from gibench.rendering.guiding.sights import look_around
+
+    learner = learner_in(scenes.box("coat"))
+    huge = np.full(learner.grid.places, 1e100)
+    sights = look_around(learner.scene, learner.guide(directions=False), learner._starts, huge, 1 << 10)
+    assert len(sights.place)
+    assert np.isfinite(sights.brought).all()

@@ -22,7 +22,7 @@ LEARNING = "gibench.rendering.guiding.learning"
 @pytest.fixture
 def quick(monkeypatch):
     monkeypatch.setattr(LEARNING + ".LANES", 1 << 13)
-    monkeypatch.setattr(LEARNING + ".PASSES_OF_DIRECTIONS", (1,))
+    monkeypatch.setattr(LEARNING + ".LOOKS", 1 << 15)
     monkeypatch.setattr(LEARNING + ".DIRECTIONS_PAY", -1.0)
 
 
