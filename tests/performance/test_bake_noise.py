@@ -22,14 +22,14 @@ from gibench.baselines.probes import baking, placement  # noqa: E402
 from gibench.rendering import surface  # noqa: E402
 from gibench.rendering.scene import GUIDED  # noqa: E402
 from tests.performance.test_noise import (  # noqa: E402
-    FRAME_PATHS,
-    FRAMES,
     REPEATS,
     RESOLUTION,
     ROOMS,
     _cpu_seconds,
     _room,
     measured,
+    tell_means,
+    tell_room,
 )
 
 pytestmark = pytest.mark.performance
@@ -174,22 +174,7 @@ def test_guided_and_plain_bakes_against_path(tmp_path, monkeypatch, baked):
         runs = texel_runs(scenes) if baked == "texels" else probe_runs(scenes, monkeypatch)
         assert_alike(runs)
         paths = len(runs["path"](0, RESOLUTION)) * SPP
-        found = measured(runs, REPEATS)
-        base = found["path"]
         print(f"\nroom {index}: {room.kind}, {'night' if room.environment.kind == 'none' else 'day'}")
-        for name, (variance, quiet, worst, seconds) in found.items():
-            shared = learning * paths / (FRAMES * FRAME_PATHS) if name == "guided" else 0.0
-            slower = (seconds + shared) / base[3]
-            row = (variance / base[0] * slower, quiet / base[1] * slower, worst / base[2], slower)
-            ratios.setdefault(name, []).append(row)
-            print(
-                f"  {name:8} variance {variance:.4f} ({quiet:.4f} trimmed), CPU s {seconds:.2f}, "
-                f"variance x time {row[0]:.2f} ({row[1]:.2f} trimmed), 99.9 % of errors below {worst:.2f}"
-            )
+        tell_room(measured(runs, REPEATS), learning, paths, ratios)
     print(f"\n{baked}, of path, geometric means over rooms (largest):")
-    for name, rows in ratios.items():
-        average, largest = np.exp(np.log(rows).mean(axis=0)), np.max(rows, axis=0)
-        print(
-            f"  {name:8} variance x time {average[0]:.2f} ({largest[0]:.2f}), trimmed {average[1]:.2f} "
-            f"({largest[1]:.2f}), 99.9 % of errors {average[2]:.2f}, time {average[3]:.2f}; {len(rows)} rooms"
-        )
+    tell_means(ratios)

@@ -77,6 +77,34 @@ def measured(runs, repeats=REPEATS):
     return found
 
 
+def tell_room(found, learning, paths, ratios):
+    """Print what `measured` found beside "path", and add it to `ratios` by name.
+
+    learning: CPU seconds of the guide, which guided renderers share by their `paths`.
+    """
+    base = found["path"]
+    for name, (variance, quiet, worst, seconds) in found.items():
+        shared = learning * paths / (FRAMES * FRAME_PATHS) if name.startswith("guided") else 0.0
+        slower = (seconds + shared) / base[3]
+        row = (variance / base[0] * slower, quiet / base[1] * slower, worst / base[2], slower)
+        ratios.setdefault(name, []).append(row)
+        print(
+            f"  {name:20} variance {variance:.3f} ({quiet:.3f} trimmed), CPU s {seconds:.2f}, "
+            f"variance x time {row[0]:.2f} ({row[1]:.2f} trimmed), 99.9 % of errors below {worst:.2f}"
+        )
+
+
+def tell_means(ratios):
+    """Print the ratios of all rooms."""
+    for name, rows in ratios.items():
+        means, largest = np.exp(np.log(rows).mean(axis=0)), np.max(rows, axis=0)
+        print(
+            f"  {name:20} variance x time {means[0]:.2f} ({largest[0]:.2f}), "
+            f"trimmed {means[1]:.2f} ({largest[1]:.2f}), 99.9 % of errors {means[2]:.2f}, "
+            f"time {means[3]:.2f}; {len(rows)} rooms"
+        )
+
+
 def _with_bulbs(room):
     """The room with bulbs in its cloth shades, which then do not glow; None where it has no such shade."""
     lights, bulbs = [], {}
@@ -153,24 +181,8 @@ def test_guided_and_plain_against_path(tmp_path, monkeypatch):
         if room.environment.kind != "none" and len(room.openings):
             runs["plain, no portals"] = ours(replace(scene, openings=None))
         found = measured(runs)
-        base = found["path"]
         sky = "day" if room.environment.kind != "none" else "night"
         print(f"\nroom {index}: {room.kind}, {sky}; guide learned in {learning:.1f} CPU s")
-        for name, (variance, quiet, worst, seconds) in found.items():
-            paths = RESOLUTION[0] * RESOLUTION[1] * SPP
-            shared = learning * paths / (FRAMES * FRAME_PATHS) if name.startswith("guided") else 0.0
-            slower = (seconds + shared) / base[3]
-            row = (variance / base[0] * slower, quiet / base[1] * slower, worst / base[2], slower)
-            ratios.setdefault(name, []).append(row)
-            print(
-                f"  {name:20} variance {variance:.3f} ({quiet:.3f} trimmed), CPU s {seconds:.2f}, "
-                f"variance x time {row[0]:.2f} ({row[1]:.2f} trimmed), 99.9 % of errors below {worst:.2f}"
-            )
+        tell_room(found, learning, RESOLUTION[0] * RESOLUTION[1] * SPP, ratios)
     print("\nof path, geometric means over rooms (largest):")
-    for name, rows in ratios.items():
-        means, largest = np.exp(np.log(rows).mean(axis=0)), np.max(rows, axis=0)
-        print(
-            f"  {name:20} variance x time {means[0]:.2f} ({largest[0]:.2f}), "
-            f"trimmed {means[1]:.2f} ({largest[1]:.2f}), 99.9 % of errors {means[2]:.2f}, "
-            f"time {means[3]:.2f}; {len(rows)} rooms"
-        )
+    tell_means(ratios)

@@ -17,6 +17,11 @@ CELLS = 6000
 """Of a grid, about: those of a furnished room are 0.3 m wide."""
 
 
+def facing(si):
+    """Geometric normal on the side that si.wi sees, unit."""
+    return dr.mulsign(si.n, dr.dot(si.n, si.to_world(si.wi)))
+
+
 class Grid:
     """Cubes over a box. arrays: those of the device."""
 

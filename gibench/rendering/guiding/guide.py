@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gibench.rendering.guiding.alias import alias_tables, pick
 from gibench.rendering.guiding.directions import BINS, bin_of, direction_in
-from gibench.rendering.guiding.grid import Grid
+from gibench.rendering.guiding.grid import Grid, facing
 from gibench.rendering.light_numbers import keys_of, light_numbers, lights_of, number_of
 from gibench.rendering.light_sampling import LightSample, inverse
 
@@ -76,9 +76,8 @@ class Guide:
 
     def row(self, si, sampler, active):
         """Row of the distributions for the side of a surface that si.wi sees. sampler: independent."""
-        normal = dr.mulsign(si.n, dr.dot(si.n, si.to_world(si.wi)))
         shift = mi.Vector3f(sampler.next_1d(), sampler.next_1d(), sampler.next_1d()) - 0.5
-        place = self.grid.place_or_outside(si.p, normal, shift)
+        place = self.grid.place_or_outside(si.p, facing(si), shift)
         return dr.gather(mi.UInt32, self._rows, place, active)
 
     def fraction(self, row, bsdf, active):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gibench.rendering.backend import tracing
 from gibench.rendering.guiding.directions import bin_of
-from gibench.rendering.guiding.grid import Grid
+from gibench.rendering.guiding.grid import Grid, facing
 from gibench.rendering.guiding.guide import Guide
 from gibench.rendering.integrator import follow_paths
 from gibench.rendering.sampling import IndependentSampler
@@ -54,11 +54,6 @@ def sampler_of(lanes: int, *key: int) -> IndependentSampler:
     seed = np.random.SeedSequence(SEED, spawn_key=key).generate_state(1)[0]
     sampler.independent.seed(dr.opaque(mi.UInt32, int(seed)), lanes)
     return sampler
-
-
-def facing(si):
-    """Geometric normal on the side that si.wi sees, unit."""
-    return dr.mulsign(si.n, dr.dot(si.n, si.to_world(si.wi)))
 
 
 class Recorder:

@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 
 from gibench.rendering.backend import tracing
 from gibench.rendering.guiding.directions import bin_of
+from gibench.rendering.guiding.grid import facing
 from gibench.rendering.guiding.guide import Guide
-from gibench.rendering.guiding.paths import Starts, facing, sampler_of
+from gibench.rendering.guiding.paths import Starts, sampler_of
 from gibench.rendering.light_sampling import emission, emission_weight
 
 
