@@ -147,15 +147,15 @@ def _guide_row(guide, si, sampler, active):
 
 
 def _scatter(
-    scene, portals, guide, context, si, bsdf, row, sampler, active, *, diffuse: bool = True
+    scene, portals, guide, context, si, bsdf, row, sampler, active, deeper, *, diffuse: bool = True
 ) -> Scattering:
     """A sample of the lights and one of the next direction, by one evaluation of the BSDF: kernels stay small.
 
-    context: of the lobes that are asked for. row: of the guide at si. diffuse: whether the diffuse lobe is among those
-    that count; the guide chooses no direction of the others.
+    context: of the lobes that are asked for. row: of the guide at si. deeper: whether another scattering event may
+    follow. diffuse: whether the diffuse lobe is among those that count; the guide chooses no direction of the others.
     """
     lit = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-    light = sample_light(scene, portals, guide, si, row, sampler, lit)
+    light = sample_light(scene, portals, guide, si, row, sampler, lit, deeper)
     lit &= light.pdf != 0
     to_light = si.to_local(light.direction)
     value, light_bounce_pdf, bounce, weight = bsdf.eval_pdf_sample(
@@ -212,13 +212,14 @@ def _follow(
     first_emission, scattered = mi.Spectrum(0), mi.Spectrum(0)
     throughput = mi.Spectrum(1)
     depth = mi.UInt32(depth)
+    mirror = mi.UInt32(0)
     first = mi.Bool(True)
 
     while active:
         si = scene.ray_intersect(ray, mi.RayFlags.All, False, active)
 
         # Emission at this vertex, weighted against the light sampling of the vertex before it.
-        weight = emission_weight(scene, portals, guide, si, reference, row, pdf, delta, active)
+        weight = emission_weight(scene, portals, guide, si, reference, row, pdf, delta, active, mirror)
         emitted = throughput * emission(scene, si, active) * weight
         if dr.hint(recorder is not None, mode="scalar"):
             recorder.met(si.emitter(scene), emitted, depth, active)
@@ -230,15 +231,15 @@ def _follow(
         bsdf = bsdf_at(si, ray)
 
         # Light sampling, and the next direction.
-        row = _guide_row(guide, si, sampler, active)
-        scattering = _scatter(scene, portals, guide, context, si, bsdf, row, sampler, active)
+        here = _guide_row(guide, si, sampler, active)
+        deeper = depth + 1 < max_depth
+        scattering = _scatter(scene, portals, guide, context, si, bsdf, here, sampler, active, deeper)
         reflected = scattering.value * scattering.incident
         scattered += throughput * reflected
-        pdf, delta = scattering.pdf, scattering.delta
         depth += 1
         if dr.hint(recorder is not None, mode="scalar"):
             recorder.vertex(
-                row,
+                here,
                 si,
                 bsdf,
                 scattering,
@@ -251,7 +252,10 @@ def _follow(
         throughput *= scattering.weight
         expected *= scattering.expected
         eta *= scattering.eta
-        reference = mi.Interaction3f(si)
+        shown = _mirror_after(guide, si, scattering, delta | (mirror > 0), active)
+        reference = _start_of(guide, si, reference, shown)
+        row, pdf = dr.select(shown > 0, row, here), dr.select(shown > 0, pdf, scattering.pdf)
+        delta, mirror = scattering.delta & (shown == 0), shown
 
         # The roulette looks at what a path is expected to carry: a guided path to where much light comes from carries
         # little for each, and must not be ended for it.
@@ -264,6 +268,25 @@ def _follow(
         expected *= spared
 
     return first_emission, scattered
+
+
+def _mirror_after(guide, si, scattering, seen_in, active):
+    """The mirror of the guide's that a path is scattered by; 0 for none.
+
+    seen_in: whether no light was sampled at the vertex before that the mirror could show.
+    """
+    if guide is None or guide.images is None:
+        return mi.UInt32(0)
+    return guide.images.at(si, active & scattering.delta & (seen_in ^ True))
+
+
+def _start_of(guide, si, before, mirror):
+    """Where the light samples start that the next emission is weighed against: at si, or at the image of the one
+    before in a mirror."""
+    start = mi.Interaction3f(si)
+    if guide is not None and guide.images is not None:
+        start.p = dr.select(mirror > 0, guide.images.point(mirror, before.p, mirror > 0), start.p)
+    return start
 
 
 def follow_paths(scene, sampler, ray, *, max_depth: int, portals=None, guide=None, recorder=None):
@@ -315,8 +338,9 @@ def scatter_paths(
 
     # The same as in the loop, and the diffuse lobe alone besides.
     row = _guide_row(guide, si, sampler.independent, active)
+    deeper = mi.Bool(max_depth >= 2)
     scattering = _scatter(
-        scene, portals, guide, asked, si, bsdf, row, sampler, active, diffuse=lobes != "specular"
+        scene, portals, guide, asked, si, bsdf, row, sampler, active, deeper, diffuse=lobes != "specular"
     )
     incident, value, weight = scattering.incident, scattering.value, scattering.weight
 
@@ -365,12 +389,15 @@ def scatter_paths(
         active,
         max_depth,
     )
+    # A mirror is a scattering event of its own.
+    shown = mi.Bool(scattering.light.mirrored)
+    straight, mirrored = dr.select(shown, 0, incident), dr.select(shown, incident, 0)
     return PathSample(
         mi.Spectrum(0),
-        incident * value_diffuse + weight_diffuse * direct,
-        incident * value_other + weight_other * direct,
-        weight_diffuse * indirect,
-        weight_other * indirect,
+        straight * value_diffuse + weight_diffuse * direct,
+        straight * value_other + weight_other * direct,
+        mirrored * value_diffuse + weight_diffuse * indirect,
+        mirrored * value_other + weight_other * indirect,
     )
 
 

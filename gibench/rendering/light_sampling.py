@@ -35,7 +35,8 @@ class LightSample:
 
     direction: unit, world space. pdf: density per steradian, 0 where there is no light. delta: whether the light is a
     point or a single direction, which no bounce meets. weight: radiance over density. emitter: pointer to the light.
-    entering: whether it was found through a portal. light: number of the light, where a guide has chosen it.
+    entering: whether it was found through a portal. mirrored: whether in a mirror, which is a scattering event more.
+    light: number of the light, where a guide has chosen it.
     """
 
     direction: Any
@@ -44,6 +45,7 @@ class LightSample:
     weight: Any
     emitter: Any
     entering: Any
+    mirrored: Any = False
     light: Any = None
 
 
@@ -54,10 +56,11 @@ def emission(scene, si, active):
     return mi.Spectrum(0) if emitter is None else emitter.eval(si, active)
 
 
-def emission_weight(scene, portals, guide, si, reference, row, pdf, delta, active):
+def emission_weight(scene, portals, guide, si, reference, row, pdf, delta, active, mirror=0):
     """MIS weight of emission met by a bounce from `reference`, against `sample_light` there.
 
-    row: of the guide at the reference. pdf, delta: of the bounce.
+    row: of the guide at the reference. pdf, delta: of the bounce. mirror: of the guide's, that the bounce has met on
+    its way; the reference is then its image.
     """
     emitter = si.emitter(scene)
     if emitter is None:
@@ -65,7 +68,7 @@ def emission_weight(scene, portals, guide, si, reference, row, pdf, delta, activ
     towards = mi.DirectionSample3f(scene, si, reference)
     active = active & (delta ^ True)
     if guide is not None:
-        return mis_weight(pdf, guide.light_density(reference, row, emitter, towards, active))
+        return mis_weight(pdf, guide.light_density(reference, row, emitter, towards, mirror, active))
     light_pdf = scene.pdf_emitter_direction(reference, towards, active)
     if portals is not None:
         by_portal = dr.select(emitter == portals.environment, portals.density(reference.p, towards.d), 0)
@@ -73,10 +76,13 @@ def emission_weight(scene, portals, guide, si, reference, row, pdf, delta, activ
     return mis_weight(pdf, light_pdf)
 
 
-def sample_light(scene, portals, guide, si, row, sampler, active) -> LightSample:
-    """Samples a light from si: of all alike, through the portals, or as the guide has it for its row."""
+def sample_light(scene, portals, guide, si, row, sampler, active, deeper=True) -> LightSample:
+    """Samples a light from si: of all alike, through the portals, or as the guide has it for its row.
+
+    deeper: whether the path may have another scattering event, as light has that comes by way of a mirror.
+    """
     if guide is not None:
-        return guide.sample_light(scene, si, row, sampler, active)
+        return guide.sample_light(scene, si, row, sampler, active, deeper)
     u = sampler.next_2d()
     if portals is None:
         sample, weight = scene.sample_emitter_direction(si, u, True, active)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from gibench.rendering.guiding.alias import alias_tables, pick
 from gibench.rendering.guiding.directions import BINS, bin_of, direction_in
 from gibench.rendering.guiding.grid import Grid, facing
+from gibench.rendering.guiding.mirrors import Images
 from gibench.rendering.light_numbers import keys_of, light_numbers, lights_of, number_of
 from gibench.rendering.light_sampling import LightSample, inverse
 
@@ -22,8 +23,8 @@ from gibench.rendering.light_sampling import LightSample, inverse
 class Distributions:
     """The learned distributions. Row 0 stands for all places of which nothing is known.
 
-    rows: (places,) uint32, the row of each place of the grid. lights: (E, L) over the lights, and the portals as one
-    more. directions: (E, BINS), relative. fraction: (E,) of directions that the guide chooses, in [0, 1); the BSDF
+    rows: (places,) uint32, the row of each place of the grid. lights: (E, L) over the lights, the portals as one more,
+    and the images of lights in mirrors. directions: (E, BINS), relative. fraction: (E,) of directions that the guide chooses, in [0, 1); the BSDF
     chooses the others.
     """
 
@@ -38,21 +39,34 @@ class Guide:
 
     All that it returns comes with its exact density, and no light and no direction that reflects light is left out, so
     that estimates are unbiased whatever was learned. directions: whether it chooses directions too; a kernel without
-    them takes a tenth less time. arrays: those of the device, for kernels that are recorded.
+    them takes a tenth less time. images: of lights in mirrors, or None. arrays: those of the device, for kernels that
+    are recorded.
     """
 
     def __init__(
-        self, mi_scene: Any, portals: Any, grid: Grid, learned: Distributions, *, directions: bool = True
+        self,
+        mi_scene: Any,
+        portals: Any,
+        grid: Grid,
+        learned: Distributions,
+        *,
+        directions: bool = True,
+        images: Images | None = None,
     ) -> None:
         """portals: `Portals` that light comes in by, or None. Under a vectorised variant, with at least one light."""
-        self.grid, self.portals, self.directions = grid, portals, directions
+        self.grid, self.portals, self.directions, self.images = grid, portals, directions, images
         emitters = lights_of(mi_scene)
         light_table, light_probability = alias_tables(learned.lights)
         table, probability = alias_tables(learned.directions if directions else learned.directions[:1])
-        self._emitters = dr.reinterpret_array(mi.EmitterPtr, mi.UInt32(keys_of(emitters)))
+        keys = keys_of(emitters)
+        if images is not None:
+            # The place of the portals is nobody's.
+            keys = np.concatenate([keys, keys[:1] if portals is not None else keys[:0], keys[images.lights]])
+        self._emitters = dr.reinterpret_array(mi.EmitterPtr, mi.UInt32(keys))
         self._numbers = light_numbers(emitters)
         self._lights = mi.UInt32(learned.lights.shape[1])
         self._portal_light = mi.UInt32(len(emitters))
+        self._first_image = mi.UInt32(len(emitters) + (portals is not None))
         self._rows = mi.UInt32(learned.rows)
         self._fraction = mi.Float(learned.fraction)
         self._light_table = mi.UInt32(light_table.ravel())
@@ -64,6 +78,7 @@ class Guide:
             self._numbers,
             self._lights,
             self._portal_light,
+            self._first_image,
             self._rows,
             self._fraction,
             self._light_table,
@@ -71,6 +86,7 @@ class Guide:
             self._table,
             self._density,
             *grid.arrays,
+            *(images.arrays if images is not None else []),
         ]
         dr.make_opaque(self.arrays)
 
@@ -132,29 +148,60 @@ class Guide:
         density = self.portals.density(reference.p, direction)
         return dr.select(active, density * self.light_probability(row, self._portal_light, active), 0)
 
-    def light_density(self, reference, row, emitter, towards, active):
+    def light_density(self, reference, row, emitter, towards, mirror, active):
         """Density with which `sample_light` finds a point of an emitter, per steradian.
 
-        reference: where from. emitter: pointers. towards: mi.DirectionSample3f to the point.
+        reference: where from, or its image in a mirror, 0 for none. emitter: pointers. towards: mi.DirectionSample3f to
+        the point.
         """
         active = active & (emitter != dr.zeros(mi.EmitterPtr))
-        chosen = self.light_probability(row, self._number(emitter, active), active)
-        density = emitter.pdf_direction(reference, towards, active) * chosen
+        light = self._number(emitter, active)
+        known = active
+        if self.images is not None:
+            image = self.images.number(mirror, light, active)
+            known = active & ((mirror == 0) | (image > 0))
+            light = dr.select(mirror == 0, light, self._first_image + image - 1)
+        chosen = self.light_probability(row, light, known)
+        density = emitter.pdf_direction(reference, towards, known) * chosen
         if self.portals is None:
             return density
-        return density + self._through_portals(
-            reference, row, towards.d, active & (emitter == self.portals.environment)
-        )
+        entering = active & (emitter == self.portals.environment)
+        if self.images is not None:
+            entering &= mirror == 0
+        return density + self._through_portals(reference, row, towards.d, entering)
 
-    def sample_light(self, scene, si, row, sampler, active):
-        """A `LightSample` of a light that si sees."""
+    def _by_mirror(self, scene, si, mirror, sample, active):
+        """By way of mirrors to samples of lights, drawn from the images of si in them.
+
+        Returns the direction to the mirror, the ray from there to the light, and how much is reflected, 0 where the
+        mirror does not show the sample.
+        """
+        towards = self.images.direction(mirror, sample.d, active)
+        met = scene.ray_intersect(si.spawn_ray(towards), mi.RayFlags.All, False, active)
+        shown = active & self.images.before(mirror, sample.p, active) & (self.images.at(met, active) == mirror)
+        _, reflected = met.bsdf().sample(mi.BSDFContext(), met, 0.5, mi.Point2f(0.5), shown)
+        return towards, met.spawn_ray_to(sample.p), dr.select(shown, reflected, 0)
+
+    def sample_light(self, scene, si, row, sampler, active, deeper):
+        """A `LightSample` of a light that si sees. deeper: whether it may be seen in a mirror."""
         light = pick(self._light_table, row, self._lights, sampler.next_1d(), active)
         u = sampler.next_2d()
         entering = mi.Bool(False) if self.portals is None else active & (light == self._portal_light)
         emitter = dr.gather(mi.EmitterPtr, self._emitters, light, active & (entering ^ True))
-        sample, weight = emitter.sample_direction(si, u, active & (entering ^ True))
+        start, mirrored = si, mi.Bool(False)
+        if self.images is not None:
+            mirrored = active & (light >= self._first_image)
+            mirror = self.images.mirror_of(light - self._first_image, mirrored)
+            start = mi.SurfaceInteraction3f(si)
+            start.p = self.images.point(mirror, si.p, mirrored)
+        sample, weight = emitter.sample_direction(start, u, active & (entering ^ True))
         direction, delta = sample.d, sample.delta
         ray = si.spawn_ray_to(sample.p)
+        if self.images is not None:
+            mirrored &= deeper & (sample.pdf > 0)
+            direction, from_mirror, reflected = self._by_mirror(scene, si, mirror, sample, mirrored)
+            ray = dr.select(mirrored, from_mirror, ray)
+            weight = dr.select(light >= self._first_image, weight * reflected, weight)
         chosen = self.light_probability(row, light, active)
         density = sample.pdf * chosen
         if self.portals is not None:
@@ -179,6 +226,8 @@ class Guide:
         else:
             weight *= inverse(chosen)
         found = active & (density > 0) & dr.isfinite(density) & (entering | (sample.pdf > 0))
+        if self.images is not None:
+            found &= (light < self._first_image) | (mirrored & dr.any(weight > 0))
         found &= scene.ray_test(ray, found) ^ True
         return LightSample(
             direction,
@@ -187,5 +236,6 @@ class Guide:
             dr.select(found, weight, 0),
             emitter if self.portals is None else dr.select(entering, self.portals.environment, emitter),
             entering,
+            mirrored,
             light,
         )

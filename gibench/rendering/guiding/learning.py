@@ -18,6 +18,7 @@ from gibench.rendering.free_space import NoFreeSpace, beginnings, free_space, su
 from gibench.rendering.guiding.directions import BINS
 from gibench.rendering.guiding.grid import Grid
 from gibench.rendering.guiding.guide import Distributions, Guide
+from gibench.rendering.guiding.mirrors import images_of
 from gibench.rendering.guiding.paths import Samples, Starts, trace
 from gibench.rendering.guiding.sights import look_around
 from gibench.rendering.guiding.sums import Sums
@@ -36,6 +37,9 @@ LOOKS = 1 << 21
 DIRECTIONS_PAY = 0.09
 """Of the second moment of bounces, the share that a guide has to take away, in the mean over places, to choose
 directions at all. They cost a tenth of the time of a path, and what they do not know shines in single pixels."""
+
+ASKED_IN_MIRRORS = 0.2
+"""Of the light samples of the first pass that ask for images of lights in mirrors."""
 
 MARGIN = 0.6
 """Metres from the free space of a room to the edge of the grid."""
@@ -67,16 +71,27 @@ class _Learner:
     ) -> None:
         """plain: (L,) probabilities of the lights without a guide. points: (N, 3), where paths start."""
         self.scene, self.portals, self.plain = scene, portals, plain
+        self.images = images_of(scene.mi_scene, lights_of(scene.mi_scene), points)
+        if self.images is not None:
+            count = len(self.images.lights)
+            self.plain = np.concatenate([(1 - ASKED_IN_MIRRORS) * plain, np.full(count, ASKED_IN_MIRRORS / count)])
         self.grid = Grid(points.min(axis=0) - MARGIN, points.max(axis=0) + MARGIN)
         # Two rows: arrays with one entry would make another kernel.
         self.learned = Distributions(
-            np.zeros(self.grid.places, np.uint32), np.tile(plain, (2, 1)), np.ones((2, BINS)), np.zeros(2)
+            np.zeros(self.grid.places, np.uint32), np.tile(self.plain, (2, 1)), np.ones((2, BINS)), np.zeros(2)
         )
         self._starts = Starts.of(points)
         self._numbers = itertools.count()
 
     def guide(self, *, directions: bool) -> Guide:
-        return Guide(self.scene.mi_scene, self.portals, self.grid, self.learned, directions=directions)
+        return Guide(
+            self.scene.mi_scene,
+            self.portals,
+            self.grid,
+            self.learned,
+            directions=directions,
+            images=self.images,
+        )
 
     def pass_of_paths(self, *, directions: bool) -> Samples:
         return trace(self.scene, self.guide(directions=directions), self._starts, LANES, next(self._numbers))

@@ -18,10 +18,11 @@ from gibench.rendering.light_numbers import light_numbers, lights_of, number_of
 from gibench.rendering.sampling import StratifiedSampler
 from gibench.rendering.scene import Scene
 
-SEEN, LIGHT_SAMPLING, PORTALS, BSDF_SAMPLING, GUIDE = range(5)
+SEEN, LIGHT_SAMPLING, PORTALS, MIRRORS, BSDF_SAMPLING, GUIDE = range(6)
 
-TECHNIQUES = ("seen straight", "light sampling", "portals", "BSDF sampling", "guide")
-"""Ways in which a path finds a light; the last is a bounce that the guide has chosen."""
+TECHNIQUES = ("seen straight", "light sampling", "portals", "mirrors", "BSDF sampling", "guide")
+"""Ways in which a path finds a light; the last is a bounce that the guide has chosen. By portals and in mirrors light
+is sampled too."""
 
 
 class _Slots:
@@ -58,7 +59,7 @@ class ContributionRecorder:
         self.met_light, self.lit_light, self.seen_light = (
             _Slots(mi.UInt32, lanes, depths) for depths in (max_depth, max_depth, 1)
         )
-        self.entering, self.guided = slots(mi.UInt32, max_depth, 2)
+        self.sampling, self.guided = slots(mi.UInt32, max_depth, 2)
         self.shape, self.material = slots(mi.UInt32, max_depth, 2)
         self.position = slots(mi.Float, max_depth)
         # Of the first vertex, by lobe.
@@ -103,7 +104,8 @@ class ContributionRecorder:
     def _place(self, si, bsdf, scattering, slot, active):
         light = scattering.light
         self.lit_light.put(self._light(light.emitter, active & (light.pdf > 0)), slot, active)
-        self.entering.put(dr.select(light.entering, mi.UInt32(1), 0), slot, active)
+        sampling = dr.select(light.entering, mi.UInt32(PORTALS), LIGHT_SAMPLING)
+        self.sampling.put(dr.select(light.mirrored, mi.UInt32(MIRRORS), sampling), slot, active)
         self.guided.put(dr.select(scattering.guided, mi.UInt32(1), 0), slot, active)
         self.shape.put(self._scene.shape_ids(si.shape, active), slot, active)
         self.material.put(self._scene.material_ids(bsdf, active), slot, active)
@@ -174,28 +176,28 @@ def _gathered(recorder: ContributionRecorder, emission: NDArray[Any], finite: ND
 
     weight = stacked(recorder.weight)[0].reshape(-1, 2, 3).astype(np.float64)
     lit_first = stacked(recorder.lit_first)[0].reshape(-1, 2, 3).astype(np.float64)
-    guided, entering = recorder.guided.numpy(), recorder.entering.numpy()
+    guided, sampling = recorder.guided.numpy(), recorder.sampling.numpy()
     met_light, lit_light = recorder.met_light.numpy(), recorder.lit_light.numpy()
     rows: list[tuple[Any, ...]] = []
 
     def add(depth: int, value: NDArray[Any], technique: Any, light: NDArray[Any]) -> None:
         lane = np.flatnonzero((value > 0).any(axis=(1, 2)) & finite)
         technique = np.broadcast_to(technique, len(value))[lane]
-        rows.append((lane, np.full(len(lane), depth), technique, light[lane], value[lane]))
+        # A mirror is a scattering event more.
+        rows.append((lane, depth + (technique == MIRRORS), technique, light[lane], value[lane]))
 
     straight = np.zeros((len(finite), 2, 3))
     straight[:, 0] = emission
     add(0, straight, SEEN, recorder.seen_light.numpy()[0])
     if len(guided):
-        add(1, lit_first, np.where(entering[0], PORTALS, LIGHT_SAMPLING), lit_light[0])
+        add(1, lit_first, sampling[0], lit_light[0])
     met_value, lit_value = stacked(recorder.met_value), stacked(recorder.lit_value)
     with np.errstate(invalid="ignore", over="ignore"):
         for depth in range(1, len(guided) + 1):
             bounced = np.where(guided[depth - 1], GUIDE, BSDF_SAMPLING)
             add(depth, weight * met_value[depth - 1][:, None], bounced, met_light[depth - 1])
             if depth > 1:
-                sampled = np.where(entering[depth - 1], PORTALS, LIGHT_SAMPLING)
-                add(depth, weight * lit_value[depth - 1][:, None], sampled, lit_light[depth - 1])
+                add(depth, weight * lit_value[depth - 1][:, None], sampling[depth - 1], lit_light[depth - 1])
     *numbers, value = (np.concatenate(column) for column in zip(*rows, strict=True))
     lanes, depths, techniques, lights = (column.astype(np.int64) for column in numbers)
     return Contributions(
