@@ -18,20 +18,29 @@ from gibench.rendering.guiding.mirrors import Images
 from gibench.rendering.light_numbers import keys_of, light_numbers, lights_of, number_of
 from gibench.rendering.light_sampling import LightSample, inverse
 
+WORTH = 0.2
+"""Share of what the start of a path reflects that a path must be expected to bring, to be followed for certain."""
+
+LEAST = 0.2
+"""Smallest probability of following a path: expectations are means over cells, and some are wrong."""
+
 
 @dataclass(frozen=True)
 class Distributions:
     """The learned distributions. Row 0 stands for all places of which nothing is known.
 
     rows: (places,) uint32, the row of each place of the grid. lights: (E, L) over the lights, the portals as one more,
-    and the images of lights in mirrors. directions: (E, BINS), relative. fraction: (E,) of directions that the guide chooses, in [0, 1); the BSDF
-    chooses the others.
+    and the images of lights in mirrors. directions: (E, BINS), relative. fraction: (E,) of directions that the guide
+    chooses, in [0, 1); the BSDF chooses the others. sent: (E,), radiance that surfaces reflect, in the mean over
+    directions, and bounced: of it what bounces bring, relative to the largest; 0 where it is not known.
     """
 
     rows: NDArray[np.uint32]
     lights: NDArray[np.float64]
     directions: NDArray[np.float64]
     fraction: NDArray[np.float64]
+    sent: NDArray[np.float64]
+    bounced: NDArray[np.float64]
 
 
 class Guide:
@@ -69,6 +78,7 @@ class Guide:
         self._first_image = mi.UInt32(len(emitters) + (portals is not None))
         self._rows = mi.UInt32(learned.rows)
         self._fraction = mi.Float(learned.fraction)
+        self._sent, self._bounced = mi.Float(learned.sent), mi.Float(learned.bounced)
         self._light_table = mi.UInt32(light_table.ravel())
         self._light_probability = mi.Float(light_probability.ravel())
         self._table = mi.UInt32(table.ravel())
@@ -81,6 +91,8 @@ class Guide:
             self._first_image,
             self._rows,
             self._fraction,
+            self._sent,
+            self._bounced,
             self._light_table,
             self._light_probability,
             self._table,
@@ -100,6 +112,21 @@ class Guide:
         """Probability that a bounce is the guide's: 0 without a diffuse lobe, where the BSDF samples better."""
         diffuse = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.DiffuseReflection)
         return dr.gather(mi.Float, self._fraction, row, diffuse)
+
+    def sent(self, row, active):
+        """Radiance that surfaces reflect, by rows; 0 where it is not known. Of the same unit as `bounced`."""
+        return dr.gather(mi.Float, self._sent, row, active)
+
+    def survival(self, row, throughput, reflected, active):
+        """Probability of following a path on from a place; 0 where nothing is known.
+
+        row: of the place. throughput: of the path, up to there. reflected: what its start reflects in all. A path that
+        is expected to bring a fifth of that or more goes on (Vorba and Křivánek 2016): how long to follow depends on
+        what there is to be found, not on the albedos met so far.
+        """
+        expected = dr.gather(mi.Float, self._bounced, row, active) * throughput
+        known = active & (expected > 0) & (reflected > 0)
+        return dr.select(known, dr.clip(expected * inverse(WORTH * reflected), LEAST, 1), 0)
 
     def density(self, row, direction, active):
         """Of the guide's directions, per steradian."""
@@ -178,7 +205,9 @@ class Guide:
         """
         towards = self.images.direction(mirror, sample.d, active)
         met = scene.ray_intersect(si.spawn_ray(towards), mi.RayFlags.All, False, active)
-        shown = active & self.images.before(mirror, sample.p, active) & (self.images.at(met, active) == mirror)
+        shown = (
+            active & self.images.before(mirror, sample.p, active) & (self.images.at(met, active) == mirror)
+        )
         _, reflected = met.bsdf().sample(mi.BSDFContext(), met, 0.5, mi.Point2f(0.5), shown)
         return towards, met.spawn_ray_to(sample.p), dr.select(shown, reflected, 0)
 

@@ -74,11 +74,18 @@ class _Learner:
         self.images = images_of(scene.mi_scene, lights_of(scene.mi_scene), points)
         if self.images is not None:
             count = len(self.images.lights)
-            self.plain = np.concatenate([(1 - ASKED_IN_MIRRORS) * plain, np.full(count, ASKED_IN_MIRRORS / count)])
+            self.plain = np.concatenate(
+                [(1 - ASKED_IN_MIRRORS) * plain, np.full(count, ASKED_IN_MIRRORS / count)]
+            )
         self.grid = Grid(points.min(axis=0) - MARGIN, points.max(axis=0) + MARGIN)
         # Two rows: arrays with one entry would make another kernel.
         self.learned = Distributions(
-            np.zeros(self.grid.places, np.uint32), np.tile(self.plain, (2, 1)), np.ones((2, BINS)), np.zeros(2)
+            np.zeros(self.grid.places, np.uint32),
+            np.tile(self.plain, (2, 1)),
+            np.ones((2, BINS)),
+            np.zeros(2),
+            np.zeros(2),
+            np.zeros(2),
         )
         self._starts = Starts.of(points)
         self._numbers = itertools.count()

@@ -215,7 +215,7 @@ def images_of(mi_scene: Any, emitters: list[Any], points: NDArray[np.float64]) -
         corners = np.array([np.array(box.corner(i)).ravel() for i in range(8)], dtype=np.float64)
         for number, plane in enumerate(planes):
             if (corners @ plane.normal > plane.offset).any():
-                distance = np.linalg.norm(corners.mean(axis=0) - plane.middle)
+                distance = float(np.linalg.norm(corners.mean(axis=0) - plane.middle))
                 pairs.append((-plane.area / max(distance, 1e-3) ** 2, light, number + 1))
     if not pairs:
         return None

@@ -56,13 +56,14 @@ class Sums:
         self.brought, self.squares = np.zeros((count, BINS)), np.zeros((count, BINS))
         self.looks = np.zeros(count)
         self.lit, self.asked = np.zeros((count, lights)), np.zeros((count, lights))
-        self.sent, self.met = np.zeros(count), np.zeros(count)
+        self.sent, self.bounced, self.met = np.zeros(count), np.zeros(count), np.zeros(count)
         self.moments, self.judged = np.zeros((count, len(FRACTIONS))), np.zeros(count)
 
     def add(self, samples: Samples) -> None:
         """What paths tell of the lights, and of what a place sends."""
         row = self.rows[samples.place].astype(np.int64)
         self.sent += np.bincount(row, samples.sent, minlength=len(self.sent))
+        self.bounced += np.bincount(row, samples.reflected, minlength=len(self.sent))
         self.met += np.bincount(row, minlength=len(self.met))
         item = row * self.lit.shape[1] + samples.light
         self.lit += np.bincount(item, np.square(samples.lit), minlength=self.lit.size).reshape(self.lit.shape)
@@ -71,6 +72,14 @@ class Sums:
     def radiance(self) -> NDArray[np.float64]:
         """(places,) that each place sends, in the mean over the directions that it is seen from."""
         return np.asarray(self._blended(self.sent[:, None], self.met[:, None], PRIOR)[self.rows, 0])
+
+    def _reflected(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(E,) radiance that rows send, and what of it bounces bring, over the largest; 0 in row 0."""
+        both = np.stack([self.sent, self.bounced], axis=1)
+        both = self._blended(both, self.met[:, None], PRIOR)
+        both[0] = 0
+        both /= max(both.max(), np.finfo(np.float64).tiny)
+        return both[:, 0], both[:, 1]
 
     def see(self, sights: Sights) -> None:
         """What looks tell of where light comes from."""
@@ -139,6 +148,7 @@ class Sums:
             (1 - LIGHT_FLOOR) * lights + LIGHT_FLOOR * plain,
             (1 - FLOOR) * directions + FLOOR * even,
             np.where(known, fraction * self.looks / (self.looks + DOUBT), 0.0),
+            *self._reflected(),
         )
 
 

@@ -173,6 +173,37 @@ def test_a_thousand_lamps():
     assert abs(one - other) < 4.5 * np.sqrt(error + other_error)
 
 
+@pytest.mark.parametrize("bounced", [1e-6, 1e6, 0.0, "any"])
+def test_expectations_change_no_mean(bounced, monkeypatch):
+    """Roulette by expectations that are far too low, far too high, none, or wrong in every place by another factor."""
+
+    def reflected(sums):
+        if bounced == "any":
+            return tuple(10 ** np.random.default_rng(0).uniform(-3, 3, (2, len(sums.sent))))
+        return np.ones(len(sums.sent)), np.full(len(sums.sent), bounced)
+
+    monkeypatch.setattr(SUMS + ".Sums._reflected", reflected)
+    plain = load_dict(scenes.box("coat"))
+    one, other = frame(replace(plain, sampling=GUIDED), seed=1), frame(plain, seed=2)
+    assert abs(z_score_of_means(one, other)) < 4
+    assert np.abs(z_scores(one, other)).max() < 6
+
+
+def test_how_likely_a_path_is_followed():
+    import drjit as dr
+    import mitsuba as mi
+
+    from gibench.rendering.guiding.guide import LEAST, WORTH
+
+    scene = replace(load_dict(scenes.box("diffuse")), sampling=GUIDED)
+    guide = scene.guide
+    guide._bounced = mi.Float([0, 1, 0.5, 0.25, 1, 1])
+    throughput = mi.Float([1, 0.5, 0.5 * WORTH, 1e-9, 1, 1e38])
+    reflected = mi.Float([1, 0.5, 0.5, 0.5, 0, 1e-38])
+    found = guide.survival(dr.arange(mi.UInt32, 6), throughput, reflected, mi.Bool(True))
+    np.testing.assert_allclose(found, [0, 1, 0.5, LEAST, 0, 1], rtol=1e-6)
+
+
 def test_parts_have_the_same_means():
     plain = load_dict(near_mirror())
     guided = replace(plain, sampling=GUIDED)

@@ -65,6 +65,7 @@ def tilted():
 def at_left(**options):
     return glass([-0.99, 0, 1], [1, 0, 0], **options)
 
+
 def screened():
     grey = scenes.two_sided(type="diffuse", reflectance=scenes.rgb(0.3))
     return {
@@ -166,7 +167,9 @@ def test_other_materials_have_no_images(bsdf):
 
 
 @pytest.mark.parametrize(
-    "shape", [{"type": "sphere", "radius": 0.4}, {"type": "cylinder", "radius": 0.4}], ids=["sphere", "cylinder"]
+    "shape",
+    [{"type": "sphere", "radius": 0.4}, {"type": "cylinder", "radius": 0.4}],
+    ids=["sphere", "cylinder"],
 )
 def test_curved_mirrors_have_no_images(shape):
     assert planes(room(ball={**shape, "bsdf": MIRROR})) == []
