@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -14,7 +14,7 @@ from gibench.metrics import reference_exposure, relmse
 from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.estimate import group_levels
 from gibench.rendering.render import render_frame
-from gibench.rendering.scene import Scene, load_dict, load_scene
+from gibench.rendering.scene import GUIDED, Scene, load_dict, load_scene
 from gibench.stress.answers import Float64, UndecidedError, largest_z
 from gibench.stress.registry import Check, Curve, Found, case
 from gibench.stress.scenes import small_room
@@ -32,16 +32,23 @@ FIRST_TIMED = 64
 
 @dataclass(frozen=True)
 class SamplingCase:
-    """A way of sampling frames. odd: with one sample less than a multiple of 4, so that none are stratified."""
+    """A way of sampling frames.
+
+    odd: with one sample less than a multiple of 4, so that none are stratified. guided: by what is learned of the scene
+    first, once for all frames; their seconds are without it.
+    """
 
     name: str
     odd: bool
     denoise: bool
+    guided: bool = False
 
 
 RAW = SamplingCase("independent", odd=True, denoise=False)
 STRATIFIED = SamplingCase("stratified", odd=False, denoise=False)
 DENOISED = SamplingCase("stratified, denoised", odd=False, denoise=True)
+GUIDED_RAW = SamplingCase("guided", odd=False, denoise=False, guided=True)
+GUIDED_DENOISED = SamplingCase("guided, denoised", odd=False, denoise=True, guided=True)
 
 
 def furnished_room() -> tuple[Scene, PinholeCamera]:
@@ -83,18 +90,20 @@ PLACES = {
 
 @case("speed against error, {where}", where=tuple(PLACES))
 def speed_against_error(where: str) -> Found:
-    """Variance falls as samples are added, and error with it: relMSE · samples is constant."""
+    """Variance falls as samples are added, and error with it: relMSE · samples is constant. Guided paths have less."""
     place = PLACES[where]
-    scene, camera = place.load()
+    plain, camera = place.load()
+    guided = replace(plain, sampling=GUIDED)
     given: dict[str, Any] = {"resolution": place.resolution, "channels": ["color", "color_se"]}
-    best = render_frame(scene, camera, spp=place.reference, seed=1000, **given).arrays
+    best = render_frame(guided, camera, spp=place.reference, seed=1000, **given).arrays
     exposure = float(reference_exposure(best["color"]))
     reference = best["color"] * np.float32(exposure)
     # What the reference itself is off, in the same measure.
     own = np.square(best["color_se"].astype(float) * exposure) / (np.square(reference.astype(float)) + 0.01)
     rows = []
     errors: dict[tuple[str, int], Float64] = {}
-    for setting in (RAW, STRATIFIED, DENOISED):
+    for setting in (RAW, STRATIFIED, DENOISED, GUIDED_RAW, GUIDED_DENOISED):
+        scene = guided if setting.guided else plain
         for wanted in place.spp:
             spp = wanted - 1 if setting.odd else wanted
             assert not setting.odd or group_levels(spp) == 0
@@ -130,6 +139,9 @@ def speed_against_error(where: str) -> Found:
         yield Check(
             "denoiser", f"relMSE denoised / raw, {spp} spp", float(ratio), 1.0, "it is there to reduce it"
         )
+    ratio = errors[GUIDED_RAW.name, most].mean() / errors[STRATIFIED.name, most].mean()
+    what = f"relMSE guided / plain, {most} spp"
+    yield Check("light", what, float(ratio), float(bound), "a guide takes noise away; spread of frames")
 
 
 def spread_of(place: Place, errors: dict[tuple[str, int], Float64]) -> Float64:

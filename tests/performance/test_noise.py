@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,6 +22,9 @@ pytestmark = pytest.mark.performance
 ROOMS = int(os.environ.get("GIBENCH_NOISE_ROOMS", "10"))
 REPEATS = int(os.environ.get("GIBENCH_NOISE_REPEATS", "12"))
 RESOLUTION, SPP = (96, 64), 64
+
+SCENES = ("kitchen", "living-room", "staircase")
+"""Files of papers."""
 
 FRAMES = 24
 """Frames that share the cost of what a room's guide takes to learn, of 256 × 192 pixels."""
@@ -154,35 +158,62 @@ def test_shades_that_glow_against_bulbs_in_them(tmp_path):
     )
 
 
+def _compared(scene, camera, monkeypatch, *, daylight):
+    """Renderers of a scene for `measured`, and the CPU seconds in which its guide was learned."""
+    guided, lights = replace(scene, sampling=GUIDED), replace(scene, sampling=GUIDED)
+    _, learning = _cpu_seconds(lambda: guided.guide)
+    with monkeypatch.context() as patch:
+        patch.setattr(learning_module, "DIRECTIONS_PAY", 1.0)
+        assert lights.guide is not None
+
+    def ours(scene):
+        return lambda seed, resolution: render_frame(
+            scene, camera, resolution=resolution, spp=SPP, seed=seed, channels=["color"]
+        ).arrays["color"]
+
+    runs = {
+        "path": lambda seed, resolution: views.render_path(
+            scene.mi_scene, camera, resolution, spp=SPP, seed=seed, max_depth=8, rr_depth=5
+        ),
+        "plain": ours(scene),
+        "guided": ours(guided),
+        "guided, lights alone": ours(lights),
+    }
+    if daylight:
+        runs["plain, no portals"] = ours(replace(scene, openings=None))
+    return runs, learning
+
+
 def test_guided_and_plain_against_path(tmp_path, monkeypatch):
+    """In generated rooms. Portals are to cost nothing where they bring nothing."""
     ratios = {}
     for index in range(ROOMS):
         room, scene, camera = _room(index, tmp_path / str(index))
-        guided = replace(scene, sampling=GUIDED)
-        _, learning = _cpu_seconds(lambda guided=guided: guided.guide)
-        lights = replace(scene, sampling=GUIDED)
-        with monkeypatch.context() as patch:
-            patch.setattr(learning_module, "DIRECTIONS_PAY", 1.0)
-            assert lights.guide is not None
-
-        def ours(scene, camera=camera):
-            return lambda seed, resolution: render_frame(
-                scene, camera, resolution=resolution, spp=SPP, seed=seed, channels=["color"]
-            ).arrays["color"]
-
-        runs = {
-            "path": lambda seed, resolution, scene=scene, camera=camera: views.render_path(
-                scene.mi_scene, camera, resolution, spp=SPP, seed=seed, max_depth=8, rr_depth=5
-            ),
-            "plain": ours(scene),
-            "guided": ours(guided),
-            "guided, lights alone": ours(lights),
-        }
-        if room.environment.kind != "none" and len(room.openings):
-            runs["plain, no portals"] = ours(replace(scene, openings=None))
+        day = room.environment.kind != "none"
+        runs, learning = _compared(scene, camera, monkeypatch, daylight=day and len(room.openings) > 0)
         found = measured(runs)
-        sky = "day" if room.environment.kind != "none" else "night"
-        print(f"\nroom {index}: {room.kind}, {sky}; guide learned in {learning:.1f} CPU s")
+        print(
+            f"\nroom {index}: {room.kind}, {'day' if day else 'night'}; guide learned in {learning:.1f} CPU s"
+        )
         tell_room(found, learning, RESOLUTION[0] * RESOLUTION[1] * SPP, ratios)
+        if "plain, no portals" in found:
+            on, off = (found[name][1] * found[name][3] for name in ("plain", "plain, no portals"))
+            print(f"  portals on / off: variance x time, trimmed, {on / off:.2f}")
     print("\nof path, geometric means over rooms (largest):")
+    tell_means(ratios)
+
+
+@pytest.mark.skipif("GIBENCH_EXTERNAL" not in os.environ, reason="needs the scenes of GIBENCH_EXTERNAL")
+def test_guided_and_plain_in_scenes_of_papers(monkeypatch):
+    from gibench.datasets.room_view import open_view
+    from gibench.generators.imported.scene import ImportSettings
+
+    ratios = {}
+    for name in SCENES:
+        file = Path(os.environ["GIBENCH_EXTERNAL"]) / "scenes" / name / "scene.xml"
+        view = open_view(file, 0, "plain", ImportSettings(allow_missing=True))
+        runs, learning = _compared(view.scene, view.camera, monkeypatch, daylight=False)
+        print(f"\n{name}; guide learned in {learning:.1f} CPU s")
+        tell_room(measured(runs), learning, RESOLUTION[0] * RESOLUTION[1] * SPP, ratios)
+    print("\nof path, geometric means over scenes (largest):")
     tell_means(ratios)
