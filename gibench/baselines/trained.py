@@ -49,8 +49,15 @@ def trained(
 
 
 def curve_of(folder: Path) -> list[dict[str, Any]]:
-    """The looks of a training, from the folder of its weights; none where it kept none."""
+    """The looks of a training, from the folder of its weights; none where it kept none.
+
+    kept: whether the weights are those of this look: the best since the learner began to count (`Learner.anew_at`).
+    """
     with suppress(OSError, ValueError, TypeError, KeyError):
         record = json.loads((folder / CURVE).read_text(encoding="utf-8"))
-        return [{name: look[name] for name in ("step", "seconds", "error")} for look in record["curve"]]
+        best = record["best"]["step"]
+        return [
+            {**{name: look[name] for name in ("step", "seconds", "error")}, "kept": look["step"] == best}
+            for look in record["curve"]
+        ]
     return []

@@ -191,20 +191,22 @@ class Results:
 
     @cached_property
     def curves(self) -> pd.DataFrame:
-        """A row a look at the held-out error of a training: result, training, step, seconds, error.
+        """A row a look at the held-out error of a training: result, training, step, seconds, error, kept.
 
-        training: numbers those of a result, from 0. What is trained on rooms stands with every result that uses it.
+        training: numbers those of a result, from 0. kept: whether the weights are those of this look; False for all of
+        a training that does not say. What is trained on rooms stands with every result that uses it.
         """
         import pandas as pd
 
         rows = [
-            (id, number, look["step"], look["seconds"], look["error"])
+            (id, number, look["step"], look["seconds"], look["error"], look.get("kept", False))
             for id, record in self._good()
             for number, curve in enumerate(record["prepare"].get("curves", []))
             for look in curve
         ]
         columns = {"result": "str", "training": "int64", "step": "int64", "seconds": "float64"}
-        return pd.DataFrame(rows, columns=[*columns, "error"]).astype(columns | {"error": "float64"})
+        columns |= {"error": "float64", "kept": "bool"}
+        return pd.DataFrame(rows, columns=list(columns)).astype(columns)
 
     @cached_property
     def frames(self) -> pd.DataFrame:

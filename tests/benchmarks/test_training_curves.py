@@ -45,12 +45,14 @@ def test_the_curve_of_a_real_training_reaches_the_tables(trained):
         for path in RunFolder(trained).root.rglob(CURVE)
         if path.parent.name.startswith("training")
     }
-    written = json.loads((folder / CURVE).read_text())["curve"]
+    record = json.loads((folder / CURVE).read_text())
+    written = record["curve"]
     curves = results.curves
     assert set(curves["result"]) == set(results.results["result"])
     for _, own in curves.groupby("result"):
         assert own["step"].tolist() == [look["step"] for look in written] == [0, 1, 2]
         assert own["error"].to_numpy() == pytest.approx([look["error"] for look in written])
+        assert own.loc[own["kept"], "step"].tolist() == [record["best"]["step"]]
         assert np.all(np.diff(own["seconds"]) > 0)
         assert np.isfinite(own["error"]).all()
         assert (own["error"] > 0).all()

@@ -18,7 +18,7 @@ FORMULA = ("=", "+", "-", "@", "\t", "\r")
 """Beginnings of texts that spreadsheets take for formulas."""
 
 _WHO = ["track", "scene", "method", "label", "knobs", "seed", "machine", "result"]
-_LOOK = ["training", "step", "seconds", "error"]
+_LOOK = ["training", "step", "seconds", "error", "kept"]
 
 
 def write_csv_files(source: ReportSource, summary: Summary, out: Path) -> list[Path]:

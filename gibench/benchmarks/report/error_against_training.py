@@ -36,7 +36,7 @@ AXES = (("seconds", "seconds of training, looks included"), ("steps", "steps of 
 
 CAPTION = (
     "Held-out errors are each method's own measure in its own space: heights compare within a row, never between rows.",
-    "0: the untrained network.  Marker: the smallest error.  ×: an error that was not finite.",
+    "0: the untrained network.  Marker: the weights that are kept.  ×: an error that was not finite.",
 )
 
 

@@ -21,7 +21,8 @@ class TrainingCurve:
 
     track, machine: of the results that use it. family: the method without the name of an ablation: errors are
     comparable within it. method: whose colour it has. name: its setting. scenes: that use it, more than one where a
-    method trains on other rooms. steps, seconds, errors: (N,), a look each; an error that was not finite is NaN.
+    method trains on other rooms. steps, seconds, errors, kept: (N,), a look each; an error that was not finite is NaN;
+    kept: whether the weights are those of this look.
     """
 
     track: str
@@ -34,11 +35,18 @@ class TrainingCurve:
     steps: NDArray[np.int64]
     seconds: NDArray[np.float64]
     errors: NDArray[np.float64]
+    kept: NDArray[np.bool_]
 
     @property
     def best(self) -> int | None:
-        """Number of the look with the smallest error, the earliest of equal ones; None where none was finite."""
+        """Number of the look whose weights were kept.
+
+        That with the smallest error, the earliest of equal ones, where the training does not say; None where none was
+        finite.
+        """
         finite = np.isfinite(self.errors)
+        if (self.kept & finite).any():
+            return int(np.argmax(self.kept & finite))
         return int(np.argmin(np.where(finite, self.errors, np.inf))) if finite.any() else None
 
 
@@ -78,6 +86,7 @@ def trainings(source: ReportSource, summary: Summary) -> list[TrainingCurve]:
             steps=looks["step"].to_numpy(np.int64),
             seconds=looks["seconds"].to_numpy(np.float64),
             errors=looks["error"].where(np.isfinite(looks["error"])).to_numpy(np.float64),
+            kept=looks["kept"].to_numpy(np.bool_),
         )
         curves.append((min(entries), number, curve))
     curves.sort(key=lambda one: (one[0], one[1], one[2].scenes, one[2].seed))

@@ -111,7 +111,8 @@ def _flat_parts(key: int, triangles: NDArray[Any], normals: NDArray[Any] | None)
         flat &= (np.einsum("fc,fkc->fk", np.nan_to_num(normal), normals) > 1 - ALIKE / 10).all(axis=1)
     triangles, normal, twice = triangles[flat], normal[flat], twice[flat]
     offset = np.einsum("fc,fc->f", normal, triangles.mean(axis=1))
-    # Of triangles that are alike to a millimetre together. A curved mirror has as many planes as triangles.
+    # Of triangles that are alike to a millimetre together: a curved mirror has as many planes as triangles. Sums are of
+    # twice the areas, so that a plane that rounding cuts in two passes.
     rounded = np.round(np.concatenate([normal, offset[:, None]], axis=1) * 1000)
     group = np.unique(rounded, axis=0, return_inverse=True)[1].ravel()
     sums = np.bincount(group, twice)

@@ -237,9 +237,9 @@ class SyntheticRun:
                 error = (
                     level * (0.1 + 0.9 * np.exp(-5 * look / max(1, self.looks - 1))) * rng.uniform(0.95, 1.05)
                 )
-                rows.append((row.result, 0, 100 * look, seconds, error))
+                rows.append((row.result, 0, 100 * look, seconds, error, False))
                 seconds += row.prepare_training_s / self.looks * rng.uniform(0.9, 1.1)
-        return pd.DataFrame(rows, columns=["result", "training", "step", "seconds", "error"])
+        return pd.DataFrame(rows, columns=["result", "training", "step", "seconds", "error", "kept"])
 
     @cached_property
     def paths(self):

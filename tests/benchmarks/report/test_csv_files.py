@@ -55,7 +55,7 @@ def test_training_carries_every_look(tables, tmp_path):
     run.curves.loc[3, "error"] = math.nan
     write_csv_files(run, summarise(run), tmp_path)
     table = pd.read_csv(tmp_path / "training.csv")
-    assert list(table.columns[-4:]) == ["training", "step", "seconds", "error"]
+    assert list(table.columns[-5:]) == ["training", "step", "seconds", "error", "kept"]
     assert set(table["method"]) == {"gpr"}
     both = table.merge(run.curves, on=["result", "training", "step"], suffixes=("", "_raw"))
     assert len(both) == len(table) == len(run.curves) == 2 * run.looks

@@ -53,6 +53,19 @@ def test_a_line_a_training_a_row_a_method(tmp_path):
     assert "held-out error, own measure" in texts
 
 
+def test_the_marker_is_where_weights_are_kept(tmp_path):
+    """Where a training says so, and at its smallest error where it does not."""
+
+    def keep(curves):
+        curves["kept"] = curves["step"] == 300
+
+    (curve,) = made(tmp_path / "says", network("a"), scenes=1, change=keep)[1]
+    assert curve.steps[curve.best] == 300
+    assert curve.errors[3] > curve.errors.min()
+    (curve,) = made(tmp_path / "silent", network("a"), scenes=1)[1]
+    assert curve.best == np.argmin(curve.errors)
+
+
 def test_the_untrained_network_stands_at_0(tmp_path):
     figure, _ = made(tmp_path, network("a"), scenes=1)
     for axes in figure.axes:
