@@ -47,24 +47,27 @@ def _room(index, folder):
     return room, load_scene(folder / "scene.xml"), PinholeCamera(camera.position, camera.target, camera.fov)
 
 
-def _cpu_seconds(function):
-    start = time.process_time()
+def _cpu_seconds(function, clock=time.process_time):
+    start = clock()
     result = function()
-    return result, time.process_time() - start
+    return result, clock() - start
 
 
-def measured(runs, repeats=REPEATS):
+def measured(runs, repeats=REPEATS, clock=time.process_time):
     """Of renderers name → function of a seed and a resolution: (relative variance, the same without the 1 % noisiest
-    pixels, 99.9th percentile of the error, CPU seconds of a frame less those of a frame of next to nothing)."""
+    pixels, 99.9th percentile of the error, CPU seconds of a frame less those of a frame of next to nothing).
+
+    clock: CPU seconds so far, of all processes that render.
+    """
     images = {name: [] for name in runs}
     seconds = {name: [] for name in runs}
     fixed = {}
     for name, run in runs.items():
         run(999, RESOLUTION)
-        fixed[name] = min(_cpu_seconds(lambda run=run: run(1, (4, 4)))[1] for _ in range(3))
+        fixed[name] = min(_cpu_seconds(lambda run=run: run(1, (4, 4)), clock)[1] for _ in range(3))
     for seed in range(repeats):
         for name, run in runs.items():
-            image, taken = _cpu_seconds(lambda run=run, seed=seed: run(seed, RESOLUTION))
+            image, taken = _cpu_seconds(lambda run=run, seed=seed: run(seed, RESOLUTION), clock)
             images[name].append(image)
             seconds[name].append(taken - fixed[name])
     values = {name: np.array(list_, dtype=float).reshape(repeats, -1, 3) for name, list_ in images.items()}
@@ -81,12 +84,12 @@ def measured(runs, repeats=REPEATS):
     return found
 
 
-def tell_room(found, learning, paths, ratios):
-    """Print what `measured` found beside "path", and add it to `ratios` by name.
+def tell_room(found, learning, paths, ratios, beside="path"):
+    """Print what `measured` found beside one of the renderers, and add it to `ratios` by name.
 
     learning: CPU seconds of the guide, which guided renderers share by their `paths`.
     """
-    base = found["path"]
+    base = found[beside]
     for name, (variance, quiet, worst, seconds) in found.items():
         shared = learning * paths / (FRAMES * FRAME_PATHS) if name.startswith("guided") else 0.0
         slower = (seconds + shared) / base[3]
