@@ -254,7 +254,7 @@ def tracing() -> Iterator[None]:
 
 @contextlib.contextmanager
 def threads_to_load() -> Iterator[None]:
-    """Two threads at least while Mitsuba reads files: with one alone its reader of OpenEXR waits for ever."""
+    """Two threads at least while Mitsuba reads or writes files: with one alone it waits for ever at an OpenEXR."""
     import drjit as dr
 
     count = dr.thread_count()

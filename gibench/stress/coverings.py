@@ -19,6 +19,7 @@ from gibench.baselines import (
     rtrt,
     unstructured_lumigraph,
 )
+from gibench.rendering.backend import threads_to_load
 from gibench.rendering.camera import PinholeCamera
 from gibench.rendering.scene import Scene, load_scene
 from gibench.stress import meshes
@@ -90,7 +91,8 @@ def room(floor: dict[str, Any], folder: Path) -> Scene:
     import mitsuba as mi
 
     slope = np.linspace(0, 0.02, 4, dtype=np.float32)[:, None, None] * np.ones((1, 4, 1), dtype=np.float32)
-    mi.Bitmap(slope).write(str(folder / BUMPS["filename"]))
+    with threads_to_load():
+        mi.Bitmap(slope).write(str(folder / BUMPS["filename"]))
     vertices, faces = meshes.cube(np.linspace(-1, 1, 5))
     sides = faces.reshape(6, -1, 3)
     walls = {"bsdf": {"type": "diffuse", "reflectance": rgb(0.0)}, "emitter": area(1.0)}

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 import os
+import subprocess
+import sys
 
 import pytest
 
@@ -137,3 +139,17 @@ def test_a_missing_package_is_named(monkeypatch):
 def test_an_empty_table_is_a_table(tmp_path):
     write_tables(Report((), (), 0, 0.0), tmp_path)
     assert (tmp_path / "stress.csv").read_text().strip() == ",".join(COLUMNS)
+
+
+@pytest.mark.skipif(
+    not hasattr(os, "sched_setaffinity"), reason="needs a process that can be kept to one processor"
+)
+def test_rooms_of_materials_are_made_on_one_processor(tmp_path):
+    """Mitsuba's writer of OpenEXR never returns where it may use one thread only."""
+    code = (
+        "import os, pathlib; os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})\n"
+        "from gibench.rendering.backend import select_variant; select_variant('auto')\n"
+        "from gibench.stress import coverings\n"
+        f"coverings.room(coverings.MATERIALS['bump'], pathlib.Path({str(tmp_path)!r}))"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=120)
