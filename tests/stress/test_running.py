@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import csv
 import os
-import subprocess
-import sys
 
 import pytest
 
@@ -15,6 +13,7 @@ from gibench.stress import registry, running
 from gibench.stress.registry import Case, Check, Curve
 from gibench.stress.running import Report, Row, rows_of
 from gibench.stress.tables import COLUMNS, markdown, write_tables
+from tests.one_processor import needs_affinity, run_on_one_processor
 
 SUBJECT = registry.SUBJECTS[0]
 
@@ -141,15 +140,12 @@ def test_an_empty_table_is_a_table(tmp_path):
     assert (tmp_path / "stress.csv").read_text().strip() == ",".join(COLUMNS)
 
 
-@pytest.mark.skipif(
-    not hasattr(os, "sched_setaffinity"), reason="needs a process that can be kept to one processor"
-)
+@needs_affinity
 def test_rooms_of_materials_are_made_on_one_processor(tmp_path):
     """Mitsuba's writer of OpenEXR never returns where it may use one thread only."""
-    code = (
-        "import os, pathlib; os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})\n"
+    run_on_one_processor(
+        "import pathlib\n"
         "from gibench.rendering.backend import select_variant; select_variant('auto')\n"
         "from gibench.stress import coverings\n"
         f"coverings.room(coverings.MATERIALS['bump'], pathlib.Path({str(tmp_path)!r}))"
     )
-    subprocess.run([sys.executable, "-c", code], check=True, timeout=120)

@@ -124,13 +124,14 @@ def _check_light(file: NamedFile) -> None:
 
 def linear(path: Path, *, raw: bool = False) -> NDArray[np.float32] | None:
     """(H, W, 3) linear values of any image that Mitsuba reads, None of another. raw: its numbers are linear already."""
-    from gibench.rendering.backend import select_variant
+    from gibench.rendering.backend import select_variant, threads_to_load
 
     select_variant()
     import mitsuba as mi
 
     try:
-        bitmap = mi.Bitmap(str(path))
+        with threads_to_load():
+            bitmap = mi.Bitmap(str(path))
         if raw:
             bitmap.set_srgb_gamma(False)
         bitmap = bitmap.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False)

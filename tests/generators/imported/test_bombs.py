@@ -13,6 +13,7 @@ from gibench.generators.imported import parsing
 from gibench.generators.imported.errors import SceneFileError
 from gibench.generators.imported.scene import ImportSettings, import_scene
 from gibench.generators.imported.shapes import MOST_SHAPES
+from tests.one_processor import needs_affinity, run_on_one_processor
 
 from .files import SQUARE, written
 
@@ -215,3 +216,20 @@ def test_what_a_parameter_is_given_counts_before_its_default(tmp_path):
     np.testing.assert_allclose(np.array(high).ravel() - np.array(low).ravel(), 6, rtol=1e-3)
     with pytest.raises(SceneFileError, match="-D: 'r' is no name=value"):
         import_scene(written(tmp_path, body), ImportSettings(parameters=("r",)))
+
+
+@needs_affinity
+def test_an_environment_is_read_on_one_processor(tmp_path):
+    """Mitsuba's reader of OpenEXR never returns where it may use one thread only."""
+    import OpenEXR
+
+    pixels = np.ones((32, 64, 3), dtype=np.float32)
+    with OpenEXR.File({"compression": OpenEXR.ZIP_COMPRESSION}, {"RGB": pixels}) as file:
+        file.write(str(tmp_path / "a.exr"))
+    body = SQUARE + '<emitter type="envmap"><string name="filename" value="a.exr"/></emitter>'
+    scene = written(tmp_path, body, version="3.0.0")
+    run_on_one_processor(
+        "from pathlib import Path\n"
+        "from gibench.generators.imported.scene import import_scene\n"
+        f"import_scene(Path({str(scene)!r}))"
+    )
