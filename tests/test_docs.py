@@ -186,12 +186,14 @@ def test_the_table_of_the_stress_suite_is_that_of_its_cases():
 
 def test_the_tables_of_the_presets_are_the_curve_and_the_recipes():
     with open(ROOT / "docs/stability/speed-furnished-room.csv", newline="") as file:
-        measured = {(row["setting"], row["spp"]): float(row["relmse"]) for row in csv.DictReader(file)}
+        measured = {(row["setting"], row["spp"]): row for row in csv.DictReader(file)}
     table = page("presets").split("| samples |")[1].split("\n\n")[0].splitlines()[2:]
+    settings = ("stratified", "guided", "stratified, denoised", "guided, denoised")
     for line in table:
-        spp, raw, denoised = (cell.strip() for cell in line.split("|")[1:4])
-        assert float(raw) == pytest.approx(measured["stratified", spp], rel=0.05)
-        assert float(denoised) == pytest.approx(measured["stratified, denoised", spp], rel=0.05)
+        spp, *said = (cell.strip() for cell in line.split("|")[1:-1])
+        rows = [measured[setting, spp] for setting in settings]
+        numbers = [float(row[column]) for column in ("relmse", "seconds") for row in rows]
+        assert [float(cell) for cell in said] == pytest.approx(numbers, rel=0.06)
     for name, (samples, denoised) in {
         name: (int(spp), how == "denoised")
         for name, spp, how in re.findall(r"^\| `(\w+)` \| (\d+), (\w+) \|", page("presets"), re.M)
