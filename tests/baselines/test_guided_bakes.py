@@ -1,4 +1,8 @@
-"""Lightmap texels and probe texels have the same means under a guide as without, over 64 independent repeats."""
+"""Lightmap texels and probe texels have the same means under a guide as without, over 64 independent repeats.
+
+Of 256 paths each: with 16 most repeats miss what is rare and bright, more of them without a guide, and scores of single
+texels lean to one side.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +32,7 @@ def pair():
         "lamp": {
             "type": "sphere",
             "center": [0.0, 0.0, 0.6],
-            "radius": 0.1,
+            "radius": 0.14,
             "bsdf": {"type": "diffuse"},
             "emitter": scenes.area(8, 7, 6),
         },
@@ -78,7 +82,7 @@ def test_lightmap_texels(pair):
             barycentrics=np.tile(coverage.barycentrics, (REPEATS, 1)),
         )
         texels = TexelPoints(scene, unwrapping, tiled)
-        values, known = trace_texels(texels, first, spp=16, max_depth=MAX_DEPTH, seed=seed)
+        values, known = trace_texels(texels, first, spp=256, max_depth=MAX_DEPTH, seed=seed)
         assert known.any()
         return values.astype(float).mean(axis=1).reshape(REPEATS, -1)
 
@@ -89,7 +93,7 @@ def test_lightmap_texels(pair):
 def test_probe_texels(pair, what):
     from gibench.baselines.probes.baking import ProbeSettings, _Baker
 
-    settings = ProbeSettings(count=2, width=8, height=4, spp=16)
+    settings = ProbeSettings(count=2, width=8, height=4, spp=256)
     positions = np.tile(np.array([[0.5, -0.4, 0.0], [-0.3, 0.6, 0.7]], dtype=np.float32), (REPEATS, 1))
 
     def repeats(scene):
