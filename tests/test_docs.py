@@ -193,7 +193,7 @@ def test_the_tables_of_the_presets_are_the_curve_and_the_recipes():
         spp, *said = (cell.strip() for cell in line.split("|")[1:-1])
         rows = [measured[setting, spp] for setting in settings]
         numbers = [float(row[column]) for column in ("relmse", "seconds") for row in rows]
-        assert [float(cell) for cell in said] == pytest.approx(numbers, rel=0.06)
+        assert [float(cell) for cell in said] == pytest.approx(numbers, rel=0.05)
     for name, (samples, denoised) in {
         name: (int(spp), how == "denoised")
         for name, spp, how in re.findall(r"^\| `(\w+)` \| (\d+), (\w+) \|", page("presets"), re.M)

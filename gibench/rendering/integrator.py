@@ -249,19 +249,14 @@ def _follow(
                 active,
             )
         ray = si.spawn_ray(scattering.direction)
-        survival, roulette = _roulette(guide, here, throughput, reflected, depth, active)
-        throughput *= scattering.weight
         expected *= scattering.expected
         eta *= scattering.eta
-        shown = _mirror_after(guide, si, scattering, delta | (mirror > 0), active)
-        reference = _start_of(guide, si, reference, shown)
+        survival, roulette = _roulette(guide, here, throughput, reflected, expected, eta, depth, active)
+        throughput *= scattering.weight
+        reference, shown = _reference_after(guide, si, scattering, reference, delta | (mirror > 0), active)
         row, pdf = dr.select(shown > 0, row, here), dr.select(shown > 0, pdf, scattering.pdf)
         delta, mirror = scattering.delta & (shown == 0), shown
 
-        # Where nothing is known, what a path is expected to carry decides: a guided one to where much light comes from
-        # carries little for each, and must not be ended for it.
-        survival = dr.select(survival > 0, survival, dr.max(expected) * dr.square(eta))
-        survival = dr.minimum(survival, RR_CAP)
         active &= (survival > 0) & (dr.max(throughput) > 0)
         active &= (roulette ^ True) | (sampler.next_1d() < survival)
         spared = dr.select(roulette, inverse(survival), 1)
@@ -271,36 +266,31 @@ def _follow(
     return first_emission, scattered
 
 
-def _roulette(guide, row, throughput, reflected, depth, active):
-    """Probability with which a path goes on from where it has been scattered, as far as the guide knows it, else 0, and
-    whether it is asked at all.
+def _roulette(guide, row, throughput, reflected, expected, eta, depth, active):
+    """Probability with which a path goes on from where it has been scattered, and whether it is asked at all.
 
-    row: of the guide. throughput: up to there. reflected: as for `_follow`. depth: this event included.
+    row: of the guide there. throughput: up to there. expected, eta, depth: as in `_follow`, this event included.
     """
-    late = depth >= RR_DEPTH
-    if guide is None or reflected is None:
-        return mi.Float(0), late
-    survival = guide.survival(row, dr.max(throughput), reflected, active)
-    return survival, late | (survival > 0)
+    # What a path is expected to carry: a guided one to where much light comes from carries little for each, and must
+    # not be ended for it.
+    survival, asked = dr.max(expected) * dr.square(eta), depth >= RR_DEPTH
+    if guide is not None and reflected is not None:
+        by_guide = guide.survival(row, dr.max(throughput), reflected, active)
+        survival, asked = dr.select(by_guide > 0, by_guide, survival), asked | (by_guide > 0)
+    return dr.minimum(survival, RR_CAP), asked
 
 
-def _mirror_after(guide, si, scattering, seen_in, active):
-    """The mirror of the guide's that a path is scattered by; 0 for none.
+def _reference_after(guide, si, scattering, before, no_image, active):
+    """Where the light samples start that the next emission is weighed against, and the guide's mirror that shows them.
 
-    seen_in: whether no light was sampled at the vertex before that the mirror could show.
+    At si, with mirror 0; where a mirror has scattered the path, at the image of the reference before. no_image: whether
+    nothing was sampled there that the mirror could show.
     """
-    if guide is None or guide.images is None:
-        return mi.UInt32(0)
-    return guide.images.at(si, active & scattering.delta & (seen_in ^ True))
-
-
-def _start_of(guide, si, before, mirror):
-    """Where the light samples start that the next emission is weighed against: at si, or at the image of the one
-    before in a mirror."""
-    start = mi.Interaction3f(si)
+    start, mirror = mi.Interaction3f(si), mi.UInt32(0)
     if guide is not None and guide.images is not None:
+        mirror = guide.images.at(si, active & scattering.delta & (no_image ^ True))
         start.p = dr.select(mirror > 0, guide.images.point(mirror, before.p, mirror > 0), start.p)
-    return start
+    return start, mirror
 
 
 def follow_paths(scene, sampler, ray, *, max_depth: int, portals=None, guide=None, recorder=None):

@@ -61,14 +61,18 @@ def flat_mirrors(mi_scene: Any, points: NDArray[np.float64]) -> list[Plane]:
         if bsdf is not None and _is_mirror(bsdf) and not shape.is_emitter():
             planes += (fronts := _planes(shape))
             if bsdf.class_name() == "TwoSidedBRDF":
-                box = shape.bbox()
-                corners = np.array([np.array(box.corner(i)).ravel() for i in range(8)], dtype=np.float64)
                 # A sheet has a back. That of a slab is inside it.
                 backs = (replace(p, normal=-p.normal, offset=-p.offset) for p in fronts)
-                planes += [p for p in backs if (corners @ p.normal < p.offset + APART).all()]
+                planes += [p for p in backs if (_corners(shape) @ p.normal < p.offset + APART).all()]
     seen = [p for p in planes if p.area >= SMALLEST and (points @ p.normal > p.offset + 1e-3).any()]
     # Shapes come in any order; which of several alike are taken must not depend on it.
     return sorted(seen, key=lambda p: (-p.area, *p.middle, *p.normal))[:MOST_MIRRORS]
+
+
+def _corners(shape: Any) -> NDArray[np.float64]:
+    """(8, 3), of the box around a shape."""
+    box = shape.bbox()
+    return np.array([np.array(box.corner(i)).ravel() for i in range(8)], dtype=np.float64)
 
 
 def _is_mirror(bsdf: Any) -> bool:
@@ -212,8 +216,7 @@ def images_of(mi_scene: Any, emitters: list[Any], points: NDArray[np.float64]) -
         shape = shapes.get(registry_key("EmitterPtr", emitter))
         if shape is None:
             continue
-        box = shape.bbox()
-        corners = np.array([np.array(box.corner(i)).ravel() for i in range(8)], dtype=np.float64)
+        corners = _corners(shape)
         for number, plane in enumerate(planes):
             if (corners @ plane.normal > plane.offset).any():
                 distance = float(np.linalg.norm(corners.mean(axis=0) - plane.middle))

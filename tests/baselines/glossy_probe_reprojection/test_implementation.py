@@ -157,14 +157,14 @@ def test_knobs_that_do_not_bake_change_the_image_and_change_it_back(mirror):
 def test_two_steps_make_the_roughness_of_one(tmp_path):
     """Probes of half the roughness and the filter, against the truth, and against those without the filter.
 
-    It takes noise of the probes away: with 64 paths in place of 16 their errors are alike here.
+    It takes noise of the probes away: with 64 paths in place of 4 their errors are alike here.
     """
     scene = saved(mirror_floor(0.4), tmp_path)
     where = site(scene, tmp_path)
     size = (64, 48)
     truth = render_frame(scene, CAMERA, resolution=size, spp=1024, channels=["radiance"]).arrays
     expected = np.minimum(truth["direct_specular"] + truth["indirect_specular"], 1)
-    knobs = {"probe_spp": 16, "parameterization": "plain"}
+    knobs = {"probe_spp": 4, "parameterization": "plain"}
     implementation = prepared(GPR, where, **knobs)
 
     def error(**given):
@@ -172,7 +172,7 @@ def test_two_steps_make_the_roughness_of_one(tmp_path):
         found = implementation.render(View(Shot(CAMERA), None, size, 0, 0), Stages()).specular
         return np.sqrt(np.mean((np.minimum(found, 1) - expected) ** 2))
 
-    assert error() < 0.92 * error(filter=False)
+    assert error() < 0.85 * error(filter=False)
 
 
 def test_the_frame_before_stands_in_where_no_probe_has_a_sample(mirror, monkeypatch):
