@@ -333,7 +333,7 @@ def scatter_paths(
     `Scene.layers`, without which all of `principled` counts as diffuse. guide: `Scene.guide`, for less noise.
     recorder: a `PathRecorder`, or None. emission of the result is 0.
     """
-    by_hand = layers is not None and (layers.principled or layers.masked)
+    by_hand = layers is not None and (layers.inseparable or layers.masked)
     mask = {"all": flags.ALL_LOBES, "diffuse": flags.DIFFUSE, "specular": flags.NOT_DIFFUSE}[lobes]
     # What ignores the lobes that are asked for is sampled whole and taken apart. So is a material with holes, whose
     # samples Mitsuba weighs wrongly (a coat four times) where the diffuse lobe alone is asked for.

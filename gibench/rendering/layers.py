@@ -23,6 +23,9 @@ LEAF, SIDES, NESTED, MASK, BLEND = range(5)
 PRINCIPLED = ("Principled", "PrincipledThin")
 """Classes of materials that evaluate all of their lobes whichever they are asked for."""
 
+INSEPARABLE = (*PRINCIPLED, "PolarizedPlastic")
+"""Classes of materials whose lobes cannot be sampled alone. `pplastic` can be asked for one, and says its density as if
+the other were there too: that of its diffuse lobe integrates to .29."""
 
 PLAIN_ETA = ("SmoothPlastic", "SmoothDielectric")
 """Classes of materials whose index of refraction is a plain number, for which Mitsuba 3.9's attribute says 0."""
@@ -39,14 +42,15 @@ class Leaf:
 class Layers:
     """The trees below the materials of a scene.
 
-    depth: of the deepest one; 0 where all are leaves. principled, transmits: whether a leaf is of one of the classes
-    PRINCIPLED, or lets light through. masked: whether a material has holes.
+    depth: of the deepest one; 0 where all are leaves. principled, inseparable, transmits: whether a leaf is of one of
+    the classes PRINCIPLED or INSEPARABLE, or lets light through. masked: whether a material has holes.
     """
 
     def __init__(self, bsdfs: list[Any]) -> None:
         """bsdfs: those of the scene's shapes, under the current variant."""
         self.depth = 0
         self.principled = False
+        self.inseparable = False
         self.transmits = False
         self.masked = False
         self._blends = False
@@ -72,6 +76,7 @@ class Layers:
         name = bsdf.class_name()
         if not children:
             self.principled |= name in PRINCIPLED
+            self.inseparable |= name in INSEPARABLE
             self.transmits |= bool(int(bsdf.flags()) & flags.TRANSMITS)
             if name in PLAIN_ETA:
                 self._etas[registry_key("BSDFPtr", bsdf)] = float(mi.traverse(bsdf)["eta"])

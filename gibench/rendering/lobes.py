@@ -1,9 +1,9 @@
 """The lobes of a material: its diffuse reflection, and everything else, which counts as specular.
 
 Mitsuba's materials evaluate the lobes that a `BSDFContext` asks for, but for `principled`, which evaluates all of them
-whichever it is asked for. Here it is taken apart, also inside of blends, masks and two-sided materials, so that whoever
-wants one lobe gets that lobe whatever the material is: the path tracer, lightmaps, probes, and methods that follow the
-specular lobe alone.
+whichever it is asked for; and they sample those lobes, but for this one and `pplastic`. Here both are taken apart,
+inside of blends, masks and two-sided materials too, so that whoever wants one lobe gets that lobe whatever the material
+is: the path tracer, lightmaps, probes, and methods that follow the specular lobe alone.
 """
 
 # mypy: disable-error-code="no-untyped-def, misc"
@@ -87,7 +87,7 @@ def sample_specular(
 
     sample1, sample2: mi.Float and mi.Point2f in [0, 1). The first chooses among lobes and blended materials.
     """
-    if not layers.principled:
+    if not layers.inseparable:
         return bsdf.sample(lobes_of(flags.NOT_DIFFUSE), si, sample1, sample2, active)
     bounce, weight = bsdf.sample(lobes_of(flags.ALL_LOBES), si, sample1, sample2, active)
     return bounce, _specular_weight(layers, bsdf, si, bounce, weight, active)
@@ -100,7 +100,7 @@ def eval_pdf_sample_specular(
 
     Returns value, density, sample, value over density of the sample. The density is that by which the sample is drawn.
     """
-    if not layers.principled:
+    if not layers.inseparable:
         return bsdf.eval_pdf_sample(lobes_of(flags.NOT_DIFFUSE), si, wo, sample1, sample2, active)
     value, pdf, bounce, weight = bsdf.eval_pdf_sample(
         lobes_of(flags.ALL_LOBES), si, wo, sample1, sample2, active

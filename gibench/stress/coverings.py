@@ -49,9 +49,14 @@ BUMPS: dict[str, Any] = {"type": "bitmap", "filename": "bumps.exr", "raw": True}
 MATERIALS: dict[str, dict[str, Any]] = {
     "diffuse": MATT,
     "roughplastic": PLASTIC,
+    "pplastic": {"type": "pplastic", "diffuse_reflectance": rgb(0.6, 0.4, 0.2), "alpha": 0.2},
     "plastic": {"type": "plastic", "diffuse_reflectance": rgb(0.6, 0.4, 0.2)},
     "roughconductor": metal(0.2),
+    "brushed roughconductor": {"type": "roughconductor", "material": "Cu", "alpha_u": 0.3, "alpha_v": 0.1},
     "conductor": {"type": "conductor", "material": "Cu"},
+    "dielectric": {"type": "dielectric"},
+    "thindielectric": {"type": "thindielectric"},
+    "roughdielectric": {"type": "roughdielectric", "alpha": 0.2},
     "principled": PRINCIPLED,
     "principledthin": {
         "type": "principledthin",
@@ -82,9 +87,14 @@ MATERIALS: dict[str, dict[str, Any]] = {
 }
 """Stock materials of Mitsuba, and what may lie over them."""
 
+SHEER = ("dielectric", "thindielectric", "roughdielectric", "principledthin", "mask")
+"""Plugins that let light through."""
+
 
 def room(floor: dict[str, Any], folder: Path) -> Scene:
     """A closed cube of black sides that emit 1, but for the floor: whatever it reflects, it reflects uniform light.
+
+    Below a floor that lets light through is another such cube, without a ceiling.
 
     folder: where its scene.xml is written, since some methods read materials from there.
     """
@@ -97,8 +107,12 @@ def room(floor: dict[str, Any], folder: Path) -> Scene:
     sides = faces.reshape(6, -1, 3)
     walls = {"bsdf": {"type": "diffuse", "reflectance": rgb(0.0)}, "emitter": area(1.0)}
     shapes = []
+    closed = np.concatenate([*sides[:4], sides[5]])
+    if floor["type"] in SHEER:
+        lower = np.concatenate(sides[:5]) + len(vertices)
+        vertices, closed = np.concatenate([vertices, vertices - [0, 0, 2]]), np.concatenate([closed, lower])
     for name, own, plugins in (
-        ("walls", np.concatenate([*sides[:4], sides[5]]), walls),
+        ("walls", closed, walls),
         ("floor", sides[4], {"bsdf": floor}),
     ):
         mesh(vertices, own).write_ply(str(folder / f"{name}.ply"))
@@ -148,7 +162,7 @@ METHODS = (
     (efficient_light_probes.SEARCH, FROM_PROBES),
 )
 
-THROUGH = "what a surface lets through is asked of probes in front of it"
+THROUGH = "light that a sheet scatters through it is asked of probes in front of it, and no mirror image"
 
 HALVED = "probes of half the roughness lose less light below the horizon of a metal, and the filter gives none back"
 
@@ -156,7 +170,7 @@ LEANING = "principled is taken apart at the normal below the map, as Mitsuba tel
 
 
 KNOWN_CASES = (
-    (("mask", "principled mask", "principledthin"), ("light-field-probes",), "specular", THROUGH),
+    (("principledthin",), ("light-field-probes", "isg"), "specular", THROUGH),
     (("roughconductor", "principled metal"), ("gpr",), "specular", HALVED),
     (
         ("principled normal map", "principled bump"),

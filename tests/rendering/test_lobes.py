@@ -17,6 +17,7 @@ COAT = {"type": "roughplastic", "alpha": 0.2, "distribution": "ggx"}
 MATERIALS = {
     "diffuse": MATT,
     "coat": COAT,
+    "pplastic": {"type": "pplastic", "alpha": 0.2, "diffuse_reflectance": {"type": "rgb", "value": COLOR}},
     "principled": PRINCIPLED,
     "two-sided": {"type": "twosided", "inside": PRINCIPLED},
     "blend": {"type": "blendbsdf", "weight": 0.4, "one": PRINCIPLED, "other": COAT},
@@ -77,7 +78,7 @@ def test_lobes_sum_to_the_material_and_samples_weigh_what_they_are(material):
         assert not numbers(other).any()
 
 
-def test_a_holes_share_is_taken_once(material):
+def test_paths_of_the_diffuse_lobe_alone_bring_its_integral(material):
     """Paths that reflect by the diffuse lobe alone, in uniform light, against that lobe's integral."""
     import drjit as dr
     import mitsuba as mi

@@ -44,7 +44,7 @@ def _reflected(layers, bsdf, si, sample1, sample2, active):
 
     Of 64 samples of all lobes of glass all but one to three go through.
     """
-    if layers.principled:
+    if layers.inseparable:
         return sample_specular(layers, bsdf, si, sample1, sample2, active)
     reflections = flags.NOT_DIFFUSE & ~flags.TRANSMITS
     return bsdf.sample(lobes_of(reflections | int(mi.BSDFFlags.Null)), si, sample1, sample2, active)

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Any
+from typing import Any, ClassVar
 
 import drjit as dr
 import mitsuba as mi
@@ -15,6 +15,7 @@ from gibench.baselines.lightmap.glossy_layer import GlossyLayer
 from gibench.baselines.method import Site, View
 from gibench.baselines.probes.baking import ProbeSettings
 from gibench.baselines.probes.maps import load_probes
+from gibench.baselines.transmission import goes_through, seen_through, transmits
 from gibench.rendering import flags
 from gibench.rendering.lobes import sample_specular
 from gibench.rendering.replay import Replay, ray_generator
@@ -60,7 +61,8 @@ def glossy_light(scene, layers, field: LightField, sampler, si, bsdf, active, sa
     while glossy & (done < samples):
         bounce, weight = sample_specular(layers, bsdf, si, sampler.next_1d(), sampler.next_2d(), glossy)
         direction = si.to_world(bounce.wo)
-        alive = glossy & (dr.max(weight) > 0)
+        # What goes through is looked for by another ray: probes stand in front of it.
+        alive = glossy & (dr.max(weight) > 0) & (goes_through(layers, bsdf, bounce, glossy) ^ True)
         light, outcome, effort = light_along(scene, field, si.p, direction, metre, alive)
         value = weight * light
         total += dr.select(alive & dr.all(dr.isfinite(value)), value, 0)
@@ -82,24 +84,35 @@ def _marched(scene, field: LightField, camera, preliminary, seed, samples, metre
     return found
 
 
+def _behind(scene, lightmap, camera, preliminary, width: int, height: int):
+    hits = hits_of_rays(scene, ray_generator(camera), (width, height), preliminary)
+    light = seen_through(scene.mi_scene, scene.layers, lightmap, hits.si, hits.bsdf, hits.glossy)
+    dr.eval(light)
+    return light
+
+
 class LightFieldProbes(GlossyLayer):
     """See `gibench.baselines.light_field_probes.METHOD`."""
 
+    functions: ClassVar = {**GlossyLayer.functions, "behind": _behind}
     stage = "search"
 
     def prepare(self, site: Site) -> None:
         """Bake the lightmap and the probes, or find them."""
         super().prepare(site)
+        self._transmits = transmits(site.scene.layers)
         settings = ProbeSettings.of(self.settings).octahedral(COARSE)
         field = LightField(load_probes(site, settings, MAPS))
         self.kernels["march"] = Replay(site.scene, partial(_marched, site.scene, field), field.arrays)
 
     def glossy(self, view: View, camera: dict[str, Any], preliminary: Any) -> tuple[Any, dict[str, float]]:
-        """March the glossy rays of a frame in one kernel."""
+        """March the glossy rays of a frame in one kernel; look through what can be looked through in another."""
         numbers = (view.seed % 2**32, int(self.settings["glossy_rays"]))
         metre = dr.opaque(mi.Float, float(self.settings["metre"]))
         opaque = [dr.opaque(mi.UInt32, number) for number in numbers]
         color, *effort = self.kernels["march"](camera, preliminary, *opaque, metre, *self.fine(view))
+        if self._transmits:
+            color += self.kernels["behind"](camera, preliminary, *self.fine(view))
         return color, _shares(*effort)
 
 
