@@ -34,6 +34,9 @@ CAMERA = PinholeCamera((0.0, 0.0, 0.5), (0.02, 0.0, -1.0), 0.8)
 PATHS = 1024
 """A pixel, of the answer."""
 
+SEEDS = 8
+"""Frames of each method: with one of 32 paths a pixel, which paths go through holes is a noise of .5 % of the mean."""
+
 
 def _principled(**parameters: Any) -> dict[str, Any]:
     return {"type": "principled", "base_color": rgb(0.6, 0.4, 0.2), **parameters}
@@ -202,7 +205,7 @@ def _compared(covering: str, scene: Scene, folder: Path) -> Found:
     }
     total = sum(answer.values())
     with prepared(scene, folder) as site:
-        found = frames(site, CAMERA, tuple(method for method, _ in METHODS))
+        found = frames(site, CAMERA, tuple(method for method, _ in METHODS), SEEDS)
     for method, bound in METHODS:
         frame = found[method.id]
         specular = 0.0 if frame.specular is None else float(np.mean(frame.specular, dtype=np.float64))

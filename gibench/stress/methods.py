@@ -77,8 +77,10 @@ def prepared(scene: Scene, files: Path | None = None) -> Iterator[Site]:
         yield Site(scene, files or Path(folder), RESOLUTION, (), 0, cache, Stages())
 
 
-def frames(site: Site, camera: PinholeCamera, methods: tuple[Method, ...] = METHODS) -> dict[str, Prediction]:
-    """One frame of every method."""
+def frames(
+    site: Site, camera: PinholeCamera, methods: tuple[Method, ...] = METHODS, seeds: int = 1
+) -> dict[str, Prediction]:
+    """One frame of every method, the mean over so many seeds."""
     found = {}
     for method in methods:
         names = {knob.name for knob in method.knobs}
@@ -86,8 +88,15 @@ def frames(site: Site, camera: PinholeCamera, methods: tuple[Method, ...] = METH
             method.settings({key: value for key, value in SETTINGS.items() if key in names})
         )
         running.prepare(site)
-        found[method.id] = running.render(View(Shot(camera), None, RESOLUTION, 0, 0), Stages())
+        drawn = [running.render(View(Shot(camera), None, RESOLUTION, 0, s), Stages()) for s in range(seeds)]
+        found[method.id] = drawn[0] if seeds == 1 else _mean(drawn)
     return found
+
+
+def _mean(frames: list[Prediction]) -> Prediction:
+    color = np.mean([frame.color for frame in frames], axis=0)
+    specular = [frame.specular for frame in frames if frame.specular is not None]
+    return Prediction(color=color, specular=np.mean(specular, axis=0) if specular else None)
 
 
 def wrong_values(frame: Prediction) -> float:
