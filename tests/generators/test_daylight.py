@@ -17,7 +17,7 @@ from gibench.generators.daylight import (
     sunsky,
 )
 from gibench.generators.parts import Environment
-from gibench.rendering.backend import select_variant
+from gibench.rendering.backend import select_variant, threads_to_load
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 CLEAR = {
@@ -43,7 +43,8 @@ def mi():
 def emitter(mi, environment: Environment):
     scene = ElementTree.Element("scene", version="3.0.0")
     scene.append(environment_xml(environment))
-    return mi.load_string(ElementTree.tostring(scene, encoding="unicode")).environment()
+    with threads_to_load():
+        return mi.load_string(ElementTree.tostring(scene, encoding="unicode")).environment()
 
 
 def radiance(mi, environment, directions):
@@ -137,7 +138,8 @@ def test_sampled_days_are_plausible(mi):
 
 
 def panorama(mi, folder: Path, values, name="sky.exr") -> str:
-    mi.Bitmap(np.asarray(values, np.float32)).write(str(folder / name))
+    with threads_to_load():
+        mi.Bitmap(np.asarray(values, np.float32)).write(str(folder / name))
     return str(folder / name)
 
 

@@ -9,7 +9,7 @@ import pytest
 from gibench.generators.daylight import environment_xml, hdr, sunsky
 from gibench.generators.panorama import panorama, write_panorama
 from gibench.generators.parts import Environment
-from gibench.rendering.backend import select_variant
+from gibench.rendering.backend import select_variant, threads_to_load
 from tests.generators.test_daylight import CLEAR, LUMINANCE, hemisphere, illuminance, radiance
 
 
@@ -25,7 +25,8 @@ def loaded(mi, element, folder):
     scene = ElementTree.Element("scene", version="3.0.0")
     scene.append(element)
     ElementTree.ElementTree(scene).write(folder / "scene.xml")
-    return mi.load_file(str(folder / "scene.xml")).environment()
+    with threads_to_load():
+        return mi.load_file(str(folder / "scene.xml")).environment()
 
 
 def written(mi, environment, folder):
@@ -71,7 +72,8 @@ def test_the_sun_stands_where_the_model_has_it(mi, tmp_path):
 def test_a_panorama_of_the_users_keeps_its_light_when_it_is_reduced(mi, tmp_path):
     rng = np.random.default_rng(0)
     image = rng.uniform(0.1, 2.0, (1024, 2048, 3)).astype(np.float32)
-    mi.Bitmap(image).write(str(tmp_path / "big.exr"))
+    with threads_to_load():
+        mi.Bitmap(image).write(str(tmp_path / "big.exr"))
     environment = hdr(path=str(tmp_path / "big.exr"), rotation=0.8, lux=9000.0)
     assert panorama(environment).shape == (512, 1024, 3)
     assert lux_of(panorama(environment)) == pytest.approx(9000.0, rel=0.01)
