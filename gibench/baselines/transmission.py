@@ -6,8 +6,10 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
+from gibench.baselines.first_hits import hits_of_rays
 from gibench.rendering import flags
 from gibench.rendering.lobes import lobes_of
+from gibench.rendering.replay import ray_generator
 
 SURFACES = 8
 """That a ray goes through, at most: four panes of two sides each."""
@@ -25,6 +27,8 @@ def _separable(layers, bsdf, active):
 
 def goes_through(layers, bsdf, bounce, active):
     """Whether `seen_through` tells of a sample (mi.BSDFSample3f) of a material."""
+    if not transmits(layers):
+        return mi.Bool(False)
     through = mi.has_flag(bounce.sampled_type, mi.BSDFFlags.Null)
     through |= ((bounce.sampled_type & flags.TRANSMITS) != 0) & _separable(layers, bsdf, active)
     return active & through
@@ -73,3 +77,14 @@ def seen_through(scene, layers, lightmap, si, bsdf, active):
         number += 1
         alive &= dr.max(throughput) > 0
     return total
+
+
+def seen_behind(scene, lightmap, camera, preliminary, width: int, height: int):
+    """`seen_through` at the first hits of a frame, to be recorded: one kernel, where a scene `transmits`.
+
+    scene: `Scene`. camera: from `camera_arrays`. preliminary: what its rays hit.
+    """
+    hits = hits_of_rays(scene, ray_generator(camera), (width, height), preliminary)
+    light = seen_through(scene.mi_scene, scene.layers, lightmap, hits.si, hits.bsdf, hits.glossy)
+    dr.eval(light)
+    return light

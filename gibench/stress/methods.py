@@ -89,7 +89,7 @@ def frames(
         )
         running.prepare(site)
         drawn = [running.render(View(Shot(camera), None, RESOLUTION, 0, s), Stages()) for s in range(seeds)]
-        found[method.id] = drawn[0] if seeds == 1 else _mean(drawn)
+        found[method.id] = _mean(drawn)
     return found
 
 

@@ -13,9 +13,9 @@ from gibench.baselines.image_space_gathering.gathering import gather
 from gibench.baselines.image_space_gathering.pyramid import Layout, MirrorImage, Pyramid
 from gibench.baselines.image_space_gathering.reflectance import directional_albedo
 from gibench.baselines.lightmap.deferred import OnLightmap
-from gibench.baselines.method import Prediction, View
+from gibench.baselines.method import Prediction, Site, View
 from gibench.baselines.stages import Stages
-from gibench.baselines.transmission import seen_through, transmits
+from gibench.baselines.transmission import seen_behind, transmits
 from gibench.rendering import surface
 from gibench.rendering.replay import camera_arrays, ray_generator
 
@@ -38,19 +38,15 @@ def _gbuffer(scene, lightmap, camera, width: int, height: int):
 
 
 def _mirrored(scene, lightmap, camera, preliminary, glossy, width: int, height: int):
-    """Radiance that each glossy hit would reflect if it were a mirror, d_r / (d_c + d_r) there, and what is behind."""
-    hits = hits_of_rays(scene, ray_generator(camera), (width, height), preliminary)
-    first = hits.si
+    """Radiance that each glossy hit would reflect if it were a mirror, and d_r / (d_c + d_r) there."""
+    first = hits_of_rays(scene, ray_generator(camera), (width, height), preliminary).si
     ray = first.spawn_ray(first.to_world(mi.reflect(first.wi)))
     found = scene.mi_scene.ray_intersect_preliminary(ray, coherent=False, active=glossy)
     hit = found.compute_surface_interaction(ray, mi.RayFlags.All, glossy)
     radiance = hit.emitter(scene.mi_scene).eval(hit, glossy) + lightmap.diffuse(hit, found, glossy)
     # 1 for the environment, which is infinitely far away.
     blur = dr.select(hit.is_valid(), hit.t / (first.t + hit.t), 1)
-    behind = dr.zeros(mi.Color3f, width * height)
-    if transmits(scene.layers):
-        behind = seen_through(scene.mi_scene, scene.layers, lightmap, first, hits.bsdf, glossy)
-    result = mi.Color3f(dr.select(glossy, radiance, 0)), dr.select(glossy, blur, 0), behind
+    result = mi.Color3f(dr.select(glossy, radiance, 0)), dr.select(glossy, blur, 0)
     dr.eval(result)
     return result
 
@@ -78,7 +74,17 @@ def _gathered(
 class ImageSpaceGathering(OnLightmap):
     """See `gibench.baselines.image_space_gathering.METHOD`."""
 
-    functions: ClassVar = {"g-buffer": _gbuffer, "mirror": _mirrored, "gather": _gathered}
+    functions: ClassVar = {
+        "g-buffer": _gbuffer,
+        "mirror": _mirrored,
+        "gather": _gathered,
+        "behind": seen_behind,
+    }
+
+    def prepare(self, site: Site) -> None:
+        """Bake the lightmap or find it."""
+        super().prepare(site)
+        self._transmits = transmits(site.scene.layers)
 
     def render(self, view: View, stages: Stages) -> Prediction:
         """Mirror image, gather, and the reflectance over it."""
@@ -88,7 +94,10 @@ class ImageSpaceGathering(OnLightmap):
             preliminary, base, surfaces = self.kernels["g-buffer"](camera, *fine)
             base = averaged(base, fine, grid)
         with stages.stage("ray casting"):
-            radiance, blur, behind = self.kernels["mirror"](camera, preliminary, surfaces["glossy"], *fine)
+            radiance, blur = self.kernels["mirror"](camera, preliminary, surfaces["glossy"], *fine)
+            behind = None
+            if self._transmits:
+                behind = averaged(self.kernels["behind"](camera, preliminary, *fine), fine, grid)
         with stages.stage("gather"):
             focal = dr.opaque(mi.Float, view.camera.focal_length(fine[0]))
             taps = dr.opaque(mi.UInt32, int(self.settings["taps"]))
@@ -100,5 +109,6 @@ class ImageSpaceGathering(OnLightmap):
                 fine,
                 grid,
             )
-            specular += averaged(behind, fine, grid)
+            if behind is not None:
+                specular += behind
         return Prediction(color=base + specular, specular=specular)

@@ -15,7 +15,7 @@ from gibench.baselines.lightmap.glossy_layer import GlossyLayer
 from gibench.baselines.method import Site, View
 from gibench.baselines.probes.baking import ProbeSettings
 from gibench.baselines.probes.maps import load_probes
-from gibench.baselines.transmission import goes_through, seen_through, transmits
+from gibench.baselines.transmission import goes_through, seen_behind, transmits
 from gibench.rendering import flags
 from gibench.rendering.lobes import sample_specular
 from gibench.rendering.replay import Replay, ray_generator
@@ -84,17 +84,10 @@ def _marched(scene, field: LightField, camera, preliminary, seed, samples, metre
     return found
 
 
-def _behind(scene, lightmap, camera, preliminary, width: int, height: int):
-    hits = hits_of_rays(scene, ray_generator(camera), (width, height), preliminary)
-    light = seen_through(scene.mi_scene, scene.layers, lightmap, hits.si, hits.bsdf, hits.glossy)
-    dr.eval(light)
-    return light
-
-
 class LightFieldProbes(GlossyLayer):
     """See `gibench.baselines.light_field_probes.METHOD`."""
 
-    functions: ClassVar = {**GlossyLayer.functions, "behind": _behind}
+    functions: ClassVar = {**GlossyLayer.functions, "behind": seen_behind}
     stage = "search"
 
     def prepare(self, site: Site) -> None:
