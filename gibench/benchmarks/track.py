@@ -100,6 +100,9 @@ class Preset(_Strict):
     name, so that all share what is baked. methods: by id; a method that is not named runs at its defaults. A variant
     has the base of its method, but for the knobs that make it one, and is run once. variants: whether those of methods
     run too where nobody says which methods do.
+
+    In a file, `like` names another preset of the track: what a preset says stands over what that one says, table by
+    table, and all else is as there.
     """
 
     rooms: int = Field(ge=1)
@@ -249,7 +252,7 @@ def load_track(name: str) -> Track:
 def check_track(values: Mapping[str, Any], *, source: str = "track") -> Track:
     """Check a track, its presets' recipes included. Raises TrackError; source: what it calls the place."""
     try:
-        track = Track.model_validate(values)
+        track = Track.model_validate({**values, **_with_likes(values, source)})
     except ValidationError as problems:
         problem = problems.errors()[0]
         place = ".".join(map(str, problem["loc"]))
@@ -272,6 +275,37 @@ def check_track(values: Mapping[str, Any], *, source: str = "track") -> Track:
         if missing := [c for c in dict.fromkeys(needed) if c not in reference.channels]:
             raise TrackError(f"{place}: reference: channels lacks {', '.join(missing)}, which scoring needs")
     return track
+
+
+def _with_likes(values: Mapping[str, Any], source: str) -> dict[str, Any]:
+    """The table of presets, each with what it takes from the one that it is `like`; {} where there is no such table."""
+    presets = values.get("presets")
+    if not isinstance(presets, Mapping):
+        return {}
+    whole = {}
+    for name, preset in presets.items():
+        if isinstance(preset, Mapping) and "like" in preset:
+            other = preset["like"]
+            others = {n: p for n, p in presets.items() if isinstance(p, Mapping) and "like" not in p}
+            if not isinstance(other, str) or other not in others:
+                raise TrackError(
+                    f"{source}: presets.{name}.like: no preset {other!r} that stands for itself; "
+                    f"{nearest(str(other), others)}"
+                )
+            preset = _over(others[other], {key: value for key, value in preset.items() if key != "like"})
+        whole[name] = preset
+    return {"presets": whole}
+
+
+def _over(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
+    """Two tables as one: values of `above` in the place of those below, tables within tables likewise."""
+    result = dict(below)
+    for key, value in above.items():
+        under = result.get(key)
+        if isinstance(value, Mapping) and isinstance(under, Mapping):
+            value = _over(under, value)
+        result[key] = value
+    return result
 
 
 def _check_training(track: Track, preset: Preset, place: str) -> None:

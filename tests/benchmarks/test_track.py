@@ -65,9 +65,50 @@ def test_training_views_and_references_are_of_the_same_rooms_and_no_frame_is_bot
     assert {rooms[0].cameras[view].path for view in training.rendered_views()} == {""}
 
 
+def test_a_preset_is_like_another_but_for_what_it_says():
+    def add(track, tiny):
+        tiny["room"]["kinds"] = ["office"]
+        track["presets"]["shiny"] = {
+            "like": "tiny",
+            "rooms": 2,
+            "room": {"gloss": "much", "kinds": ["living", "bedroom"]},
+        }
+
+    values = changed(add)
+    before = copy.deepcopy(values)
+    track = check_track(values)
+    assert values == before
+    tiny, shiny = track.preset("tiny"), track.preset("shiny")
+    assert (tiny.rooms, tiny.recipe("reference").gloss) == (TINY["presets"]["tiny"]["rooms"], "any")
+    assert (shiny.rooms, shiny.recipe("reference").gloss) == (2, "much")
+    room = tiny.room | {"gloss": "much", "kinds": ["living", "bedroom"]}
+    assert shiny == tiny.model_copy(update={"rooms": 2, "room": room})
+
+
+def test_glossy_rooms_of_the_walkthrough_are_cpu_with_much_gloss():
+    track = load_track("walkthrough")
+    cpu, glossy = track.preset("cpu"), track.preset("glossy")
+    assert glossy == cpu.model_copy(update={"room": cpu.room | {"gloss": "much"}})
+
+
 @pytest.mark.parametrize(
     ("change", "says"),
     [
+        (
+            lambda t, p: t["presets"].update(other={"like": "tniy"}),
+            r"presets\.other\.like: no preset 'tniy' that stands for itself; did you mean 'tiny'\?",
+        ),
+        (
+            lambda t, p: t["presets"].update(other={"like": "other"}),
+            r"presets\.other\.like: no preset 'other'",
+        ),
+        (
+            lambda t, p: t["presets"].update(other={"like": ["tiny"]}),
+            r"presets\.other\.like: no preset \['tiny'",
+        ),
+        (lambda t, p: t["presets"].update(other={"like": "tiny", "roms": 2}), r"presets\.other\.roms: Extra"),
+        (lambda t, p: t.update(presets=3), "track: presets: Input should be"),
+        (lambda t, p: t["presets"].update(other=3), r"presets\.other"),
         (lambda t, p: t.update(presetz={}), "track: presetz: Extra inputs"),
         (lambda t, p: t.update(metrics=["rmsee"]), r"metrics: no metric 'rmsee'; did you mean 'rmse'"),
         (lambda t, p: t.update(parts=["full", "gloss"]), r"parts\.1"),
