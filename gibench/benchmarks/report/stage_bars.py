@@ -38,16 +38,15 @@ def stage_bars(source: ReportSource, summary: Summary, track: str, machine: str)
         return None
     total = of["ms_median"].loc[times.index]
     shares = times.div(np.maximum(total, times.sum(axis="columns")), axis="index")
-    row, top, bottom = 0.17, 0.78, 0.42
+    beside = len(machine) <= 40  # the title; a longer name has a line of its own below
+    row, top, bottom = 0.17, 0.78, 0.42 if beside else 0.56
     names = [entry_name(summary, entry) for entry in times.index]
     height = top + bottom + row * len(times)
     figure, first = new_figure(WIDTH, height)
     first.remove()
     left = widest(figure, names) + 0.2
     about = f"track {track}{BETWEEN}medians over the path, means over rooms; numbers are milliseconds"
-    write_title(
-        figure, "Where the time of a frame goes", about if len(machine) > 40 else f"{about}{BETWEEN}{machine}"
-    )
+    write_title(figure, "Where the time of a frame goes", f"{about}{BETWEEN}{machine}" if beside else about)
     columns = [*times.columns, "frame"]
     width = (WIDTH - left - 0.1) / len(columns)
     for position, column in enumerate(columns):
@@ -73,11 +72,7 @@ def stage_bars(source: ReportSource, summary: Summary, track: str, machine: str)
                 axes.text(
                     share * 0.5 + 0.04, at, number(float(value)), size=SMALL - 0.4, va="center_baseline"
                 )
-    figure.text(
-        left / WIDTH,
-        0.16 / height,
-        "bar: share of the frame; half a column is all of it",
-        size=SMALL,
-        color=FAINT,
-    )
+    note = "bar: share of the frame; half a column is all of it"
+    for line, text in enumerate([note] if beside else [machine, note]):
+        figure.text(left / WIDTH, (0.16 + 0.14 * line) / height, text, size=SMALL, color=FAINT)
     return figure

@@ -65,6 +65,20 @@ def test_times_of_two_machines_never_share_a_plot(tmp_path):
     assert any("m1" in text for text, _ in boxes(figure))
 
 
+@pytest.mark.parametrize("gpu", [None, "NVIDIA RTX 6000 Ada Generation"])
+@pytest.mark.parametrize("cpu", ["EPYC", "Intel(R) Xeon(R) Platinum 8375C CPU @ 2.90GHz"])
+def test_bars_of_stages_name_their_machine_however_long_its_name(cpu, gpu, tmp_path):
+    run = SyntheticRun(tmp_path, scenes=1, frames=1, metrics=("rmse",), parts=("full",))
+    run.run["machine"] |= {"cpu": cpu, "gpu": gpu}
+    summary = summarise(run)
+    figure = stage_bars(run, summary, "walkthrough", summary.machines[0])
+    width, height = figure.get_size_inches() * figure.dpi
+    found = boxes(figure)
+    assert any(summary.machines[0] in text for text, _ in found)
+    assert all(Box(0, 0, width, height).holds(box) for _, box in found)
+    assert not any(a.meets(b) for (_, a), (_, b) in itertools.combinations(found, 2))
+
+
 def test_a_plot_that_is_made_again_is_the_same_file(summary, tmp_path):
     figure = lambda: error_against(summary, "walkthrough", "full", "rmse", TIME)  # noqa: E731
     first, second = (save(figure(), tmp_path, name) for name in ("one", "two"))
