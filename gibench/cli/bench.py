@@ -27,7 +27,7 @@ Folder = Annotated[Path, typer.Argument(metavar="RESULTS", help="The folder of a
 @app.command("run")
 def run_track(
     track: Annotated[str, typer.Option(help="A track, or a TOML file of your own.")] = "walkthrough",
-    preset: Annotated[str, typer.Option(help="smoke, cpu or paper.")] = "smoke",
+    preset: Annotated[str, typer.Option(help="smoke, cpu, paper or another of the track.")] = "smoke",
     out: Annotated[Path | None, typer.Option(help="Where to.", show_default="results/TRACK-PRESET")] = None,
     methods: Annotated[
         str | None, typer.Option(help="Such as lightmap,path-traced.", show_default="all of the track")

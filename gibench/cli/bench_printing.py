@@ -144,7 +144,8 @@ def _size(preset: Preset) -> str:
     width, height = reference.resolution
     held_out = [len(reference.rendered_views(room=room)) for room in range(preset.rooms)]
     most = f"{held_out[0]} frames" if min(held_out) == held_out[0] else f"up to {held_out[0]} frames"
-    text = f"{preset.rooms} rooms, {most} of {width}x{height}"
+    rooms = "1 room" if preset.rooms == 1 else f"{preset.rooms} rooms"
+    text = f"{rooms}, {most} of {width}x{height}"
     if preset.training is None:
         return f"{text}, nothing to train on"
     training = preset.recipe("training")
