@@ -282,11 +282,11 @@ def _with_likes(values: Mapping[str, Any], source: str) -> dict[str, Any]:
     presets = values.get("presets")
     if not isinstance(presets, Mapping):
         return {}
+    others = {n: p for n, p in presets.items() if isinstance(p, Mapping) and "like" not in p}
     whole = {}
     for name, preset in presets.items():
         if isinstance(preset, Mapping) and "like" in preset:
             other = preset["like"]
-            others = {n: p for n, p in presets.items() if isinstance(p, Mapping) and "like" not in p}
             if not isinstance(other, str) or other not in others:
                 raise TrackError(
                     f"{source}: presets.{name}.like: no preset {other!r} that stands for itself; "
